@@ -1,0 +1,210 @@
+"""A YAML file as a tree of values that know their place in it. The only module that knows YAML.
+
+Bounded whatever the file holds: its size, depth and number of values are limited, and aliases, which can make a short
+file mean gigabytes, are refused.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Final, NamedTuple, NoReturn
+
+import yaml
+
+from ..errors import ConfigError
+
+MAX_BYTES: Final = 1_000_000
+MAX_DEPTH: Final = 20
+MAX_VALUES: Final = 20_000
+"""Keys and values of a file: PyYAML needs about a kilobyte and 20 us for each."""
+MAX_NUMBER: Final = 64
+"""Characters of a number: the time to read one grows with the square of its length."""
+
+_TAG: Final = "tag:yaml.org,2002:"
+_CONSTRUCTED: Final = {_TAG + name for name in ("null", "bool", "int", "float")}
+_KNOWN_TAGS: Final = _CONSTRUCTED | {_TAG + name for name in ("map", "seq", "str", "timestamp", "merge", "value")}
+_HINTS: Final = {
+    "'\\t'": "indent with spaces, not with tabs",
+    "mapping values are not allowed": "check the indentation, and quote a text that contains ': '",
+    "expected <block end>": "check the indentation of this line",
+    "found another document": "one document a file: remove the line '---'",
+    "could not find expected ':'": "write 'key: value'",
+    "expected ',' or": "close the bracket",
+    "undefined alias": "quote a text that starts with '*'",
+    "while scanning a quoted scalar": "close the quote",
+}
+
+
+class Node(NamedTuple):
+    """One value of the file."""
+
+    value: bool | int | float | str | list[Node] | dict[str, Node] | None
+    text: str
+    """A scalar as it was written, without quotes; empty for lists and mappings."""
+    name: str
+    """What to call it in a message: its key, or `links[0]`."""
+    at: str
+    """`file:line:column`, both from 1."""
+    key: Node | None = None
+    """In a mapping: the key, as a value of its own."""
+
+    def fault(self, text: str) -> ConfigError:
+        """The error to raise for this value."""
+        return ConfigError(f"{self.at}: {text}")
+
+    def key_fault(self, text: str) -> ConfigError:
+        """The error to raise for this value's key."""
+        return (self.key or self).fault(text)
+
+    def plain(self) -> object:
+        """The value without places. The keys of its mappings are texts, as in JSON."""
+        if isinstance(self.value, dict):
+            return {key: node.plain() for key, node in self.value.items()}
+        return [node.plain() for node in self.value] if isinstance(self.value, list) else self.value
+
+    def shown(self) -> str:
+        """The value in a message, at most about 40 characters of it."""
+        if isinstance(self.value, dict | list):
+            return "a mapping" if isinstance(self.value, dict) else "a list"
+        if isinstance(self.value, str):
+            return quoted(self.value)
+        return short(self.text) if self.text else "empty"
+
+
+def short(text: str, limit: int = 40) -> str:
+    """At most `limit` characters of a text, on one line."""
+    cut = text if len(text) <= limit else text[: limit - 3] + "..."
+    return "".join(c if c.isprintable() else "?" for c in cut)
+
+
+def quoted(text: str) -> str:
+    """A person's text in a message: short and in quotes."""
+    return f"'{short(text)}'"
+
+
+def load_document(path: str | os.PathLike[str]) -> Node:
+    """The one document of a file; an empty file is an empty mapping. Raises ConfigError."""
+    name = os.fspath(path)
+    try:
+        with open(path, "rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise ConfigError(f"{name}: cannot read the configuration: {error.strerror or error}") from None
+    if len(data) > MAX_BYTES:
+        raise ConfigError(f"{name}:1:1: larger than {MAX_BYTES} bytes: this is not a configuration file")
+    try:
+        return parse_document(data.decode("utf-8-sig"), name)
+    except UnicodeDecodeError as error:
+        # utf-8-sig counts from behind the byte order mark, `object` is what it counts in.
+        place = _place(name, error.object[: error.start].decode("utf-8", "replace"))
+        raise ConfigError(f"{place}: not UTF-8 text: save the file as UTF-8") from None
+
+
+def parse_document(text: str, name: str) -> Node:
+    """The same for a text; `name` stands for the file in messages. Raises ConfigError."""
+    try:
+        loader = _Loader(text)
+    except yaml.reader.ReaderError as error:
+        place = _place(name, text[: error.position])
+        raise ConfigError(f"{place}: a control character: remove it") from None
+    try:
+        root = loader.get_single_node()
+        if root is None:
+            return Node({}, "", "the configuration", f"{name}:1:1")
+        return _Builder(loader, name).node(root, "the configuration")
+    except yaml.MarkedYAMLError as error:
+        raise ConfigError(_explained(error, name)) from None
+    except (ValueError, OverflowError):
+        # PyYAML lets the escape of a character that does not exist fall through.
+        raise ConfigError(f"{_mark(name, loader.get_mark())}: not YAML: no such character or number") from None
+    finally:
+        loader.dispose()
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's reader up to nodes, within limits and without aliases."""
+
+    depth = 0
+    values = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        self.depth += 1
+        self.values += 1
+        if self.check_event(yaml.AliasEvent):
+            self._refuse("aliases (*name) are not taken here: write the value out")
+        if self.depth > MAX_DEPTH:
+            self._refuse(f"nested more than {MAX_DEPTH} deep: this is not a configuration file")
+        if self.values > MAX_VALUES:
+            self._refuse(f"more than {MAX_VALUES} values: this is not a configuration file")
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
+
+    def _refuse(self, problem: str) -> NoReturn:
+        mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+        raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
+
+
+class _Builder:
+    """From PyYAML's nodes to ours."""
+
+    def __init__(self, loader: _Loader, file: str) -> None:
+        self._loader = loader
+        self._file = file
+
+    def node(self, node: yaml.Node, name: str, key: Node | None = None) -> Node:
+        """One node with all below it."""
+        at = _mark(self._file, node.start_mark)
+        if node.tag not in _KNOWN_TAGS:
+            raise ConfigError(f"{at}: the tag {quoted(node.tag.replace(_TAG, '!!'))} means nothing here: remove it")
+        if isinstance(node, yaml.MappingNode):
+            return Node(self._mapping(node), "", name, at, key)
+        if isinstance(node, yaml.SequenceNode):
+            items = [self.node(item, f"{name}[{i}]") for i, item in enumerate(node.value)]
+            return Node(items, "", name, at, key)
+        return Node(self._scalar(node, at), node.value, name, at, key)
+
+    def _mapping(self, node: yaml.MappingNode) -> dict[str, Node]:
+        entries: dict[str, Node] = {}
+        for key_node, value_node in node.value:
+            key = self.node(key_node, "the key")
+            if isinstance(key.value, dict | list):
+                raise key.fault(f"a key must be a word, not {key.shown()}")
+            if (first := entries.get(key.text)) is not None:
+                place = first.key.at.removeprefix(f"{self._file}:") if first.key else ""
+                raise key.fault(f"the key {quoted(key.text)} is there twice, first at {place}: remove one")
+            entries[key.text] = self.node(value_node, short(key.text), key)
+        return entries
+
+    def _scalar(self, node: yaml.Node, at: str) -> bool | int | float | str | None:
+        text: str = node.value
+        if any("\ud800" <= c <= "\udfff" for c in text):
+            raise ConfigError(f"{at}: half a surrogate pair is not a character: write the character itself")
+        if node.tag not in _CONSTRUCTED:
+            return text
+        if len(text) > MAX_NUMBER:
+            raise ConfigError(f"{at}: {quoted(text)} is too long for a number: quote it if it is a text")
+        try:
+            value: bool | int | float | None = self._loader.construct_object(node)
+        except (ValueError, LookupError, OverflowError):
+            kind = node.tag.removeprefix(_TAG)
+            raise ConfigError(f"{at}: {quoted(text)} is no {kind}: quote it if it is a text") from None
+        return value
+
+
+def _mark(file: str, mark: yaml.Mark | None) -> str:
+    return f"{file}:{mark.line + 1}:{mark.column + 1}" if mark is not None else f"{file}:1:1"
+
+
+def _place(file: str, before: str) -> str:
+    """The place behind a piece of text."""
+    lines = before.split("\n")
+    return f"{file}:{len(lines)}:{len(lines[-1]) + 1}"
+
+
+def _explained(error: yaml.MarkedYAMLError, file: str) -> str:
+    """PyYAML's several lines as one, with what would be right where that is known."""
+    # PyYAML quotes what it found, however long that is.
+    said = ", ".join(short(part, 120) for part in (error.context, error.problem) if part)
+    hint = next((hint for sign, hint in _HINTS.items() if sign in said), None)
+    return f"{_mark(file, error.problem_mark or error.context_mark)}: {said}" + (f": {hint}" if hint else "")

@@ -1,0 +1,113 @@
+"""The sections of a configuration file, and what has to hold between them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any, Final, get_type_hints
+
+from ..hardware.options import BELOW
+from ..interface import DEFAULT_HANDLE_NAME
+from ..link import url
+from .document import Node, load_document, quoted
+from .model import Config, ControllerConfig, PublisherConfig, VehicleConfig
+from .values import did_you_mean, entries, read
+
+OUR_TYPES: Final = (
+    "mav_robot_status/IndustrialRobotStatusController",
+    "industrial_robot_status_controller/IndustrialRobotStatusController",
+)
+PARAMETERS: Final[dict[str, Any]] = {
+    "handle_name": str,
+    "publish_rate": float,
+    "publish_on_change": bool,
+    "publishers": tuple[PublisherConfig, ...],
+}
+"""What our own controller takes. What another type takes is for that type to check."""
+
+
+def load(path: str | os.PathLike[str]) -> Config:
+    """Read and check a configuration file.
+
+    Raises ConfigError: `file:line:column: what is wrong and what would be right`.
+    """
+    return build(load_document(path))
+
+
+def build(document: Node) -> Config:
+    """The configuration that a file holds. Raises ConfigError."""
+    sections = get_type_hints(Config, include_extras=True)
+    del sections["controllers"]
+    given = entries(document)
+    read_sections = {key: read(sections[key], node) for key, node in given.items() if key in sections}
+    stanzas = [_controller(key, node, sections) for key, node in given.items() if key not in sections]
+    config = Config(**read_sections, controllers=tuple(stanzas))
+    _check_hysteresis(config, given)
+    _check_outs(config, given)
+    _check_vehicles(config.vehicles, given)
+    _check_handles(config, given)
+    return config
+
+
+def _controller(name: str, node: Node, sections: Mapping[str, Any]) -> ControllerConfig:
+    if not isinstance(node.value, dict) or "type" not in node.value:
+        hint = did_you_mean(name, sections)
+        raise node.key_fault(f"{quoted(name)} is neither a section nor a controller, which has a 'type': {hint}")
+    parameters = {key: value for key, value in node.value.items() if key != "type"}
+    kind = read(str, node.value["type"])
+    publishers = _check_parameters(node, parameters) if kind in OUR_TYPES else None
+    plain = {key: value.plain() for key, value in parameters.items()}
+    return ControllerConfig(name, kind, plain, (node.key or node).at, publishers)
+
+
+def _check_parameters(node: Node, parameters: dict[str, Node]) -> tuple[PublisherConfig, ...] | None:
+    entries(node._replace(value=parameters), PARAMETERS)
+    values = {key: read(PARAMETERS[key], value) for key, value in parameters.items()}
+    return values.get("publishers")
+
+
+def _check_hysteresis(config: Config, given: dict[str, Node]) -> None:
+    for lower, upper in BELOW.items():
+        low, high = getattr(config.hardware, lower), getattr(config.hardware, upper)
+        if low >= high:
+            written = entries(given["hardware"])
+            fault = (written.get(lower) or written[upper]).fault
+            raise fault(f"{lower} ({low:g} m/s) must be less than {upper} ({high:g} m/s)")
+
+
+def _check_outs(config: Config, given: dict[str, Node]) -> None:
+    for out, node in zip(config.outs, _items(given, "outs"), strict=True):
+        if url.parse(out.url).kind == "log":
+            raise node.fault(
+                f"{quoted(out.url)} is a log, and an out is sent to: write one like udpout:192.168.1.20:14550"
+            )
+        if out.passive:
+            raise entries(node)["passive"].key_fault("an out is there to be sent to: remove 'passive'")
+
+
+def _check_vehicles(vehicles: tuple[VehicleConfig, ...], given: dict[str, Node]) -> None:
+    handles: set[str] = set()
+    systems: set[tuple[int, int | None]] = set()
+    for vehicle, node in zip(vehicles, _items(given, "vehicles"), strict=True):
+        if vehicle.handle in handles:
+            raise node.fault(f"two vehicles have the handle {quoted(vehicle.handle)}: give each its own 'handle'")
+        handles.add(vehicle.handle)
+        if vehicle.system is not None:
+            if (vehicle.system, vehicle.component) in systems:
+                raise node.fault(f"system {vehicle.system} is there twice: one vehicle has one handle")
+            systems.add((vehicle.system, vehicle.component))
+
+
+def _check_handles(config: Config, given: dict[str, Node]) -> None:
+    handles = {vehicle.handle: None for vehicle in config.vehicles}
+    for controller in config.controllers:
+        wanted = controller.parameters.get("handle_name", DEFAULT_HANDLE_NAME)
+        if handles and controller.type in OUR_TYPES and wanted not in handles:
+            stanza = given[controller.name]
+            at = entries(stanza).get("handle_name", stanza.key or stanza)
+            raise at.fault(f"there is no handle {quoted(str(wanted))}; the vehicles have: {', '.join(handles)}")
+
+
+def _items(given: dict[str, Node], section: str) -> list[Node]:
+    node = given.get(section)
+    return node.value if node is not None and isinstance(node.value, list) else []

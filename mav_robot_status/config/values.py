@@ -1,0 +1,171 @@
+"""From a place in the file to a checked Python value, led by a type: `read(int, node)`, `read(LinkConfig, node)`.
+
+The types are those of the fields in `model` and `hardware.options`, so a new option needs nothing here; a new kind of
+value is one small function and one line in a table.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from enum import EnumMeta
+from typing import Annotated, Any, Final, Literal, get_args, get_origin, get_type_hints
+
+from ..errors import ConfigError, UsageError
+from ..hardware.options import OneOf, Within
+from ..link import url
+from .document import Node, quoted, short
+from .model import LinkConfig, Or, PublisherConfig
+
+MAX_TEXT: Final = 1000
+"""Characters of a name or a connection string."""
+_SECONDS: Final = re.compile(r"(\d+(?:\.\d*)?|\.\d+) ?(ms|s)", re.ASCII)
+
+
+def read(hint: Any, node: Node) -> Any:
+    """The node as a value of that type. Raises ConfigError with the place, what is wrong and what would be right."""
+    if hint in _KINDS:
+        return _KINDS[hint](node)
+    if dataclasses.is_dataclass(hint):
+        return read_fields(hint, node)
+    if isinstance(hint, EnumMeta):
+        return hint[_one_of(node.text, hint.__members__, node)]
+    return _GENERIC[get_origin(hint)](hint, node)
+
+
+def read_fields(cls: Any, node: Node) -> Any:
+    """A mapping as a dataclass; what is not written has the field's default."""
+    hints = get_type_hints(cls, include_extras=True)
+    return cls(**{key: read(hints[key], value) for key, value in entries(node, hints).items()})
+
+
+def entries(node: Node, known: Iterable[str] | None = None) -> dict[str, Node]:
+    """The entries of a mapping, none for an empty value. Refuses keys beside the known ones."""
+    if node.value is None:
+        return {}
+    if not isinstance(node.value, dict):
+        keys = f" with the keys {', '.join(known)}" if known else ""
+        raise node.fault(f"{node.name} must be a mapping{keys}, not {node.shown()}")
+    for key, value in node.value.items():
+        if known is not None and key not in known:
+            raise value.key_fault(f"{node.name} has no key {quoted(key)}: {did_you_mean(key, known)}")
+    return node.value
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """The nearest of the known words, or all of them."""
+    known = list(known)
+    near = difflib.get_close_matches(short(word), known, 1)
+    return f"did you mean '{near[0]}'?" if near else f"it is one of: {', '.join(known)}"
+
+
+def must_be(what: str, node: Node) -> ConfigError:
+    """The error for a value that is not what it must be."""
+    return node.fault(f"{node.name} must be {what}, not {node.shown()}")
+
+
+def _one_of(word: str, known: Iterable[str], node: Node) -> str:
+    known = list(known)
+    if word not in known:
+        raise node.fault(f"{node.name} cannot be {node.shown()}: {did_you_mean(word, known)}")
+    return word
+
+
+def _bool(node: Node) -> bool:
+    if not isinstance(node.value, bool):
+        raise must_be("true or false", node)
+    return node.value
+
+
+def _text(node: Node) -> str:
+    if not isinstance(node.value, str):
+        raise must_be("a text (in quotes if it looks like something else)", node)
+    if not 0 < len(node.value) <= MAX_TEXT or not node.value.isprintable():
+        raise node.fault(f"{node.name} must be a text of one line, 1 to {MAX_TEXT} characters")
+    return node.value
+
+
+def _number(kind: type[int | float], node: Node, within: Within | None = None, word: Or | None = None) -> int | float:
+    value: Any = _seconds(node.value) if within and within.unit == "s" else node.value
+    if type(value) in (int, kind) and math.isfinite(value) and (not within or within.low <= value <= within.high):
+        return kind(value)
+    what = "a whole number" if kind is int else "a number"
+    bounds = f" from {within.low:.10g} to {within.high:.10g} {within.unit}".rstrip() if within else ""
+    raise must_be(what + bounds + (f" or '{word.word}'" if word else ""), node)
+
+
+def _seconds(value: object) -> object:
+    """`10 ms` and `3.5 s` as seconds; anything else as it is."""
+    match = _SECONDS.fullmatch(value) if isinstance(value, str) else None
+    return float(match[1]) / (1000 if match[2] == "ms" else 1) if match else value
+
+
+def _annotated(hint: Any, node: Node) -> Any:
+    base, *rules = get_args(hint)
+    by_type = {type(rule): rule for rule in rules}
+    if (word := by_type.get(Or)) is not None:
+        # `base` is `kind | None`: the word is how a file writes None.
+        if node.text == word.word:
+            return None
+        base = next(kind for kind in get_args(base) if kind is not type(None))
+    if (names := by_type.get(OneOf)) is not None:
+        return _one_of(node.text, names.names, node)
+    return _number(base, node, by_type.get(Within), word)
+
+
+def _literal(hint: Any, node: Node) -> str:
+    # What was written counts: `false` is one of the words, though YAML takes it for something else.
+    return _one_of(node.text, get_args(hint), node)
+
+
+def _list(hint: Any, node: Node) -> Any:
+    if node.value is None:
+        return get_origin(hint)()
+    if not isinstance(node.value, list):
+        raise must_be("a list ('- ' before each item, or [in brackets])", node)
+    return get_origin(hint)(read(get_args(hint)[0], item) for item in node.value)
+
+
+def _mapping(hint: Any, node: Node) -> dict[Any, Any]:
+    key_hint, value_hint = get_args(hint)
+    return {read(key_hint, value.key or value): read(value_hint, value) for value in entries(node).values()}
+
+
+def _link(node: Node) -> LinkConfig:
+    given = node.value if isinstance(node.value, dict) else {"url": node}
+    if "url" not in given:
+        raise node.fault(f"{node.name} has no 'url': write a connection like udp:127.0.0.1:14550, or {{url: ...}}")
+    text = _text(given["url"])
+    try:
+        url.parse(text)
+    except UsageError as error:
+        raise given["url"].fault(str(error)) from None
+    link: LinkConfig = read_fields(LinkConfig, node._replace(value=given))
+    return link
+
+
+def _publisher(node: Node) -> PublisherConfig:
+    given = dict(node.value) if isinstance(node.value, dict) else {"type": node}
+    if "type" not in given:
+        raise node.fault(f"{node.name} has no 'type': write a publisher's name, or {{type: ..., with its options}}")
+    name = _text(given.pop("type"))
+    return PublisherConfig(name, {key: option.plain() for key, option in given.items()})
+
+
+_KINDS: Final[dict[Any, Callable[[Node], Any]]] = {
+    bool: _bool,
+    str: _text,
+    float: lambda node: _number(float, node),
+    LinkConfig: _link,
+    PublisherConfig: _publisher,
+}
+_GENERIC: Final[dict[Any, Callable[[Any, Node], Any]]] = {
+    Annotated: _annotated,
+    Literal: _literal,
+    tuple: _list,
+    frozenset: _list,
+    Mapping: _mapping,
+}

@@ -1,0 +1,92 @@
+"""What a configuration means, for `check-config`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+
+from ..hardware.options import HardwareOptions
+from ..interface import DEFAULT_HANDLE_NAME
+from ..link import url
+from .model import Config, ControllerConfig, LinkConfig, VehicleConfig
+from .reader import OUR_TYPES
+
+
+def describe(config: Config) -> list[str]:
+    """What a configuration means, in words, a line for each part."""
+    return [
+        *(f"link: {_link(link)}" for link in config.links),
+        *([] if config.links else ["link: none in the file; give one on the command line"]),
+        *(f"out: {_link(out)}" for out in config.outs),
+        *(f"vehicle: {_vehicle(vehicle)}" for vehicle in config.vehicles),
+        *([] if config.vehicles else ["vehicle: every autopilot that is heard, each with a handle of its own"]),
+        f"identity: {_identity(config)}",
+        *_options(config.hardware),
+        f"requests: {_REQUESTS[config.requests]}",
+        *([f"coalesce: input gathers for {config.coalesce * 1000:g} ms before it is read"] if config.coalesce else []),
+        *(f"controller {controller.name}: {_controller(controller)}" for controller in config.controllers),
+        *([] if config.controllers else ["controller: the default one for each handle"]),
+    ]
+
+
+_REQUESTS = {
+    "missing": "messages that are needed and do not come are asked for",
+    "none": "nothing is asked of the autopilot",
+}
+
+
+def _link(link: LinkConfig) -> str:
+    return url.parse(link.url).words() + (" (passive: nothing is sent there)" if link.passive else "")
+
+
+def _vehicle(vehicle: VehicleConfig) -> str:
+    who = (
+        f"system {vehicle.system}" if vehicle.system is not None else "the first system heard that no other entry names"
+    )
+    which = f"component {vehicle.component}" if vehicle.component is not None else "any autopilot component"
+    return f"{who}, {which} -> handle '{vehicle.handle}'"
+
+
+def _identity(config: Config) -> str:
+    identity = config.identity
+    system = f"system {identity.system}" if identity.system is not None else "the vehicle's own system"
+    heartbeat = "with" if identity.heartbeat else "without"
+    return f"{system}, component {identity.component}, {heartbeat} a HEARTBEAT of its own"
+
+
+def _options(options: HardwareOptions) -> Iterator[str]:
+    """Those that are not at their default."""
+    default = HardwareOptions()
+    for option in fields(options):
+        value, usual = getattr(options, option.name), getattr(default, option.name)
+        if value != usual:
+            yield f"hardware: {option.name} = {_value(value)} (default {_value(usual)})"
+
+
+def _value(value: object) -> str:
+    if isinstance(value, dict):
+        return (
+            ", ".join(
+                f"{key}: {{{_value(item)}}}" if isinstance(item, dict) else f"{key}: {_value(item)}"
+                for key, item in value.items()
+            )
+            or "none"
+        )
+    if isinstance(value, frozenset):
+        return ", ".join(sorted(value)) or "none"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return getattr(value, "name", None) or str(value)
+
+
+def _controller(controller: ControllerConfig) -> str:
+    if controller.type not in OUR_TYPES:
+        return f"type {controller.type}, which checks its own parameters ({', '.join(controller.parameters) or 'none'})"
+    rate = controller.parameters.get("publish_rate", 10)
+    when = [f"at {rate} Hz"] if isinstance(rate, int | float) and rate > 0 else []
+    when += ["on change"] if controller.parameters.get("publish_on_change", True) else []
+    outputs = (
+        "the default publisher" if controller.publishers is None else ", ".join(p.type for p in controller.publishers)
+    )
+    handle = controller.parameters.get("handle_name", DEFAULT_HANDLE_NAME)
+    return f"handle '{handle}' {' and '.join(when) or 'never'} to {outputs or 'nobody'}"

@@ -1,0 +1,149 @@
+"""`IndustrialRobotStatusController`: hands the status in a handle to publishers, at a rate. It holds no other logic.
+
+A port of ros_control's industrial_robot_status_controller. Where it does otherwise a comment starts `ORIGINAL:`;
+`docs/controller.md` lists them.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections import deque
+from typing import TYPE_CHECKING, Final
+
+from .interface import (
+    DEFAULT_HANDLE_NAME,
+    IndustrialRobotStatusHandle,
+    IndustrialRobotStatusInterface,
+    RobotStatusMsg,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from .clock import Instant
+    from .interface import Detail, InterfaceManager, Publisher, RobotStatus
+
+log = logging.getLogger(__name__)
+
+DEFAULT_PUBLISH_RATE: Final = 10.0  # Hz
+MOST_CHANGES: Final = 20  # lines a second on change, for each publisher
+WINDOW: Final = 1.0  # s
+RETRY: Final = 0.02  # s until a busy publisher is asked again
+
+
+class _Output:
+    """One publisher and what it was given."""
+
+    __slots__ = ("changes", "last", "publisher", "sent", "skipped")
+
+    def __init__(self, publisher: Publisher, start: float) -> None:
+        self.publisher = publisher
+        self.last = start
+        """The time of the last periodic message: it keeps the phase."""
+        self.sent: tuple[RobotStatus, Detail] | None = None
+        self.changes: deque[float] = deque(maxlen=MOST_CHANGES)
+        self.skipped = 0
+        """Messages that were due and not taken because the publisher was busy."""
+
+
+class IndustrialRobotStatusController:
+    """Publishes the status of one handle periodically, and on change."""
+
+    def __init__(self) -> None:
+        self.publish_rate = DEFAULT_PUBLISH_RATE
+        self.publish_on_change = True
+        self.handle: IndustrialRobotStatusHandle
+        self._publishers: Sequence[Publisher] = ()
+        self._outputs: list[_Output] = []
+
+    def init(self, hw: InterfaceManager, parameters: Mapping[str, object], publishers: Sequence[Publisher]) -> None:
+        """Read the parameters and find the handle; each default that is used is announced in the log.
+
+        Raises UnknownHandleError if no handle of that name is registered.
+        """
+        rate = parameters.get("publish_rate")
+        if rate is None:
+            log.info("'publish_rate' not set, using default: %g Hz", DEFAULT_PUBLISH_RATE)
+        else:
+            self.publish_rate = float(rate)  # type: ignore[arg-type]
+        name = parameters.get("handle_name")
+        if name is None:
+            name = DEFAULT_HANDLE_NAME
+            log.info("'handle_name' not set, using default: '%s'", name)
+        self.publish_on_change = bool(parameters.get("publish_on_change", True))
+        self.handle = hw.get(IndustrialRobotStatusInterface).get_handle(str(name))
+        self._publishers = publishers
+
+    def starting(self, time: Instant) -> None:
+        """Begin to publish: the first periodic message is due one period after `time`."""
+        self._outputs = [_Output(publisher, time.mono) for publisher in self._publishers]
+
+    def update(self, time: Instant, period: float) -> None:
+        """Publish what is due at `time`. `period` (seconds since the last update) is ros_control's; it is not used.
+
+        ORIGINAL: publishes periodically only. A change is published at once, at most 20 times a second, so that a
+        reader need not wait for the next period; it does not move the periodic phase.
+        """
+        handle = self.handle
+        now = time.mono
+        msg: RobotStatusMsg | None = None
+        for output in self._outputs:
+            sent = output.sent
+            changed = self.publish_on_change and (
+                sent is None
+                or (sent[0] is not handle.status and sent[0] != handle.status)
+                or (sent[1] is not handle.detail and sent[1] != handle.detail)
+            )
+            due = self._is_due(output, now)
+            if not due and not (changed and self._may_change(output, now)):
+                continue
+            if output.publisher.busy():
+                # ORIGINAL: skips a busy publisher too, but does not count it.
+                output.skipped += 1
+                continue
+            if due:
+                self._keep_phase(output, now)
+            else:
+                output.changes.append(now)
+            if msg is None:
+                age = None if handle.heard_at is None else now - handle.heard_at
+                msg = RobotStatusMsg(handle.name, time.unix_us, handle.status, handle.detail, age)
+            output.sent = (handle.status, handle.detail)
+            output.publisher.publish(msg)
+
+    def stopping(self, time: Instant) -> None:
+        """End publishing. What was skipped is told in the log."""
+        skipped = sum(output.skipped for output in self._outputs)
+        if skipped:
+            log.warning("%s: %d messages were skipped because an output was busy", self.handle.name, skipped)
+        self._outputs = []
+
+    def next_due(self, now: float) -> float:
+        """The time (monotonic seconds) at which `update` has something to do, if the handle does not change before."""
+        due = math.inf
+        for output in self._outputs:
+            if self.publish_rate > 0 and output.publisher.periodic:
+                # strictly later than due, see _is_due
+                due = min(due, math.nextafter(output.last + 1 / self.publish_rate, math.inf))
+            if self.publish_on_change and output.sent != (self.handle.status, self.handle.detail):
+                full = len(output.changes) == MOST_CHANGES
+                due = min(due, output.changes[0] + WINDOW if full else now)
+        return max(due, now + RETRY) if due <= now else due
+
+    def _is_due(self, output: _Output, now: float) -> bool:
+        """Strictly later than a period after the last periodic message; never at a rate of 0 or less."""
+        rate = self.publish_rate
+        return rate > 0 and output.publisher.periodic and output.last + 1 / rate < now
+
+    def _keep_phase(self, output: _Output, now: float) -> None:
+        """The next period begins where this one was due, not where it was published."""
+        period = 1 / self.publish_rate
+        output.last += period
+        # ORIGINAL: goes on by one period only, so a stall is followed by a burst of all the messages missed.
+        if output.last + period < now:
+            output.last += math.floor((now - output.last) / period) * period
+
+    def _may_change(self, output: _Output, now: float) -> bool:
+        changes = output.changes
+        return len(changes) < MOST_CHANGES or now - changes[0] >= WINDOW

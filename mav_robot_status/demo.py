@@ -1,0 +1,43 @@
+"""The `demo` command: a fake rover and the real gateway in one process, over UDP loopback.
+
+The story's notes go to the log (standard error), the statuses as JSON lines to standard output, as they change.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from typing import TYPE_CHECKING
+
+from .config import Config, LinkConfig, PublisherConfig
+from .gateway.live import Live
+from .gateway.plant import DEFAULT_CONTROLLER
+from .link.udp import UdpLink
+from .testing import DEMO, FakeAutopilot
+
+if TYPE_CHECKING:
+    from typing import TextIO
+
+    from .testing import Scenario, Step
+
+log = logging.getLogger(__name__)
+
+
+def run_demo(stdout: TextIO, *, loop: bool = False, scenario: Scenario = DEMO, speed: float = 1.0) -> None:
+    """Play the scenario once, or for ever; SIGINT and SIGTERM end it. `speed` is that of the story's steps."""
+    controller = dataclasses.replace(
+        DEFAULT_CONTROLLER,
+        publishers=(PublisherConfig("json", {"changes_only": True}), PublisherConfig("mavlink")),
+    )
+    # port 0: the kernel picks a free one, so that the demo runs beside whatever else does
+    config = Config(links=(LinkConfig("udpin:127.0.0.1:0"),), controllers=(controller,))
+    gateway = Live(config, stdout)
+    gateway.stop_on_signals()
+    link = gateway.stations[0].link
+    assert isinstance(link, UdpLink)
+    with FakeAutopilot(scenario, to=("127.0.0.1", link.port), loop=loop, speed=speed, on_note=_tell) as autopilot:
+        gateway.run(until=lambda: autopilot.finished)
+
+
+def _tell(step: Step) -> None:
+    log.info("%5.1f s  %s", step.at, step.note)

@@ -1,0 +1,44 @@
+"""When the autopilot booted, from its own clock, and whether that clock has started anew.
+
+Sources: MAVLink developer guide, routing: `SYSTEM_TIME.time_boot_ms` going back means a reboot. Any message that
+carries time_boot_ms serves. A step back counts when the next sample confirms it: packets that a network repeats do not.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+STEP_BACK_MS: Final = 2000
+WRAP: Final = 1 << 32
+GRACE: Final = 10.0
+"""Seconds after boot during which sensor bits raise no error."""
+
+
+class Boot(NamedTuple):
+    """The autopilot's clock as last heard."""
+
+    at: float
+    """Monotonic seconds of the boot; of the first heartbeat while no clock was heard."""
+    clock_ms: int | None = None
+    doubt_ms: int | None = None
+    """A sample that lies back and waits to be confirmed."""
+
+
+def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> tuple[Boot, bool]:
+    """The clock after one more sample, and whether it shows a reboot."""
+    booted = now - time_boot_ms / 1000
+    if boot.clock_ms is None:
+        return Boot(booted, time_boot_ms), False
+    step = _difference(time_boot_ms, boot.clock_ms)
+    if step >= -STEP_BACK_MS:
+        return Boot(
+            boot.at if step < 0 else booted, max(time_boot_ms, boot.clock_ms) if step < 0 else time_boot_ms
+        ), False
+    if boot.doubt_ms is None or _difference(time_boot_ms, boot.doubt_ms) < 0:
+        return boot._replace(doubt_ms=time_boot_ms), False
+    return Boot(booted, time_boot_ms), True
+
+
+def _difference(a: int, b: int) -> int:
+    """a - b on a 32-bit clock that may have wrapped."""
+    return (a - b + WRAP // 2) % WRAP - WRAP // 2

@@ -1,0 +1,46 @@
+"""One message more: memory and message in, memory out. Each kind of message has its function in the table below."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
+
+from ...clock import Instant
+from ...mavlink import definitions as mav
+from ..memory import Memory
+from . import beats, modes, movement, sensing, words
+from .words import pass_time
+
+if TYPE_CHECKING:
+    from ..options import HardwareOptions
+
+__all__ = ["HANDLERS", "hear", "pass_time"]
+
+Handler = Callable[[Memory, Any, Instant, "HardwareOptions"], Memory]
+
+HANDLERS: Final[dict[type, Handler]] = {
+    mav.Heartbeat: beats.heartbeat,
+    mav.SysStatus: sensing.sys_status,
+    mav.Statustext: words.statustext_,
+    mav.Event: words.event,
+    mav.ExtendedSysState: movement.extended_sys_state,
+    mav.GlobalPositionInt: movement.global_position,
+    mav.LocalPositionNed: movement.local_position,
+    mav.VfrHud: movement.vfr_hud,
+    mav.Attitude: movement.attitude,
+    mav.SystemTime: movement.system_time,
+    mav.ServoOutputRaw: movement.servo_output_raw,
+    mav.ParamValue: movement.param_value,
+    mav.EscTelemetry1To4: movement.esc_telemetry,
+    mav.EscTelemetry5To8: movement.esc_telemetry,
+    mav.EscTelemetry9To12: movement.esc_telemetry,
+    mav.EscStatus: movement.esc_status,
+    mav.CurrentMode: modes.current_mode,
+    mav.AvailableModes: modes.available_modes,
+}
+
+
+def hear(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
+    """The memory after one more message of this vehicle; a message of no interest changes nothing."""
+    handler = HANDLERS.get(type(message))
+    return memory if handler is None else handler(memory, message, now, options)

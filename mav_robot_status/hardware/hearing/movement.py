@@ -1,0 +1,166 @@
+"""Position, speed, attitude, motor outputs: what moves, and the clock that those messages carry."""
+
+from __future__ import annotations
+
+import math
+from struct import unpack
+from typing import TYPE_CHECKING, Any
+
+from ...interface.status import TriState
+from ...mavlink import definitions as mav
+from .. import boot as boot_rules
+from .. import estop, motion, outputs, sensors
+from ..identity import SURFACE_BOAT, Family, Stack
+from ..memory import observed
+from ..observation import Heard, heard, is_fresh
+from .beats import rebooted
+
+if TYPE_CHECKING:
+    from ...clock import Instant
+    from ..memory import Memory
+    from ..options import HardwareOptions
+
+
+def extended_sys_state(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
+    """EXTENDED_SYS_STATE: the landed state."""
+    return observed(memory, extended_sys_state=heard(message, now.mono, memory.observation.extended_sys_state))
+
+
+def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions) -> Memory:
+    """GLOBAL_POSITION_INT: the first choice for speed."""
+    memory = _clock(memory, message.time_boot_ms, now)
+    memory = observed(memory, global_position=heard(message, now.mono, memory.observation.global_position))
+    nowhere = message.lat == 0 and message.lon == 0
+    return _moved(memory, _speed(memory, message.vx / 100, message.vy / 100, message.vz / 100, nowhere), now, options)
+
+
+def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> Memory:
+    """LOCAL_POSITION_NED: the speed while no global position is fresh."""
+    memory = _clock(memory, message.time_boot_ms, now)
+    memory = observed(memory, local_position=heard(message, now.mono, memory.observation.local_position))
+    if is_fresh(memory.observation.global_position, now.mono, motion.FRESH):
+        return memory
+    return _moved(memory, _speed(memory, message.vx, message.vy, message.vz, False), now, options)
+
+
+def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> Memory:
+    """VFR_HUD: the last choice for speed; the throttle for the output watch."""
+    memory = observed(memory, vfr_hud=heard(message, now.mono, memory.observation.vfr_hud))
+    observation = memory.observation
+    if is_fresh(observation.global_position, now.mono, motion.FRESH) or is_fresh(
+        observation.local_position, now.mono, motion.FRESH
+    ):
+        return memory
+    climb = 0.0 if message.groundspeed == 0 else message.climb  # a ground speed of exactly 0 alone is no estimate
+    return _moved(memory, _speed(memory, message.groundspeed, 0.0, climb, False), now, options)
+
+
+def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> Memory:
+    """ATTITUDE: rotation."""
+    memory = _clock(memory, message.time_boot_ms, now)
+    return observed(memory, attitude=heard(message, now.mono, memory.observation.attitude))
+
+
+def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> Memory:
+    """SYSTEM_TIME: the autopilot's clock."""
+    return _clock(memory, message.time_boot_ms, now)
+
+
+def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> Memory:
+    boot, anew = boot_rules.heard_clock(memory.boot, time_boot_ms, now.mono)
+    return rebooted(memory, boot, now) if anew else memory._replace(boot=boot)
+
+
+def _speed(memory: Memory, north: float, east: float, down: float, nowhere: bool) -> float | None:
+    """Speed in m/s, None where the numbers mean that there is no estimate.
+
+    ArduPilot sends exactly zero (and its last position) when it has none, and up to 6 m/s at rest while its estimator
+    is unhealthy; INAV sends zero without GPS.
+    """
+    if not (math.isfinite(north) and math.isfinite(east) and math.isfinite(down)):
+        return None
+    status = memory.observation.sys_status
+    still = north == 0 and east == 0 and down == 0
+    if memory.stack is Stack.ARDUPILOT:
+        if still and (nowhere or status is None or not sensors.estimate_is_healthy(status.message)):
+            return None
+        if not memory.pulse.armed and status is not None and sensors.estimate_is_faulty(status.message):
+            return None
+    elif memory.stack is Stack.INAV and still and not _has_gps(status):
+        return None
+    return math.hypot(north, east) if memory.family is Family.ROVER else math.hypot(north, east, down)
+
+
+def _has_gps(status: Heard | None) -> bool:
+    return status is not None and bool(
+        status.message.onboard_control_sensors_present & status.message.onboard_control_sensors_health & sensors.GPS
+    )
+
+
+def rotation(memory: Memory, now: float) -> float:
+    """Rotation in rad/s: about the vertical for boats, which always roll; 0 while not freshly heard."""
+    attitude = memory.observation.attitude
+    if attitude is None or not is_fresh(attitude, now, motion.FRESH):
+        return 0.0
+    m: mav.Attitude = attitude.message
+    rates = (m.yawspeed,) if memory.vehicle_type == SURFACE_BOAT else (m.rollspeed, m.pitchspeed, m.yawspeed)
+    return max((abs(rate) for rate in rates if math.isfinite(rate)), default=0.0)
+
+
+def _moved(memory: Memory, speed: float | None, now: Instant, options: HardwareOptions) -> Memory:
+    rate = rotation(memory, now.mono)
+    return memory._replace(motion=motion.moved(memory.motion, speed, rate, memory.pulse.armed, options, now.mono))
+
+
+def driving_speed(memory: Memory) -> float:
+    """What would grow if the motors really ran: speed over ground of a rover, climb of a copter; m/s."""
+    hud = memory.observation.vfr_hud
+    if hud is None:
+        return 0.0
+    speed: float = hud.message.groundspeed if memory.family is Family.ROVER else hud.message.climb
+    return speed if math.isfinite(speed) else 0.0
+
+
+def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, options: HardwareOptions) -> Memory:
+    """SERVO_OUTPUT_RAW: the output watch of ArduPilot."""
+    if memory.stack is not Stack.ARDUPILOT or not options.watch_outputs or message.port != 0:
+        return memory
+    hud = memory.observation.vfr_hud
+    throttle = hud.message.throttle if hud is not None and is_fresh(hud, now.mono, motion.FRESH) else None
+    values = (*message[1:9], *message[10:18])
+    watch = outputs.heard_outputs(
+        memory.watch, values, memory.vehicle_type, memory.pulse, throttle, driving_speed(memory), now.mono
+    )
+    stop = memory.stop
+    if watch.driven and stop.said is TriState.TRUE:
+        stop = estop.NOTHING  # a motor that is driven is not stopped, whatever was said before
+    return memory._replace(watch=watch, stop=stop)
+
+
+def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: HardwareOptions) -> Memory:
+    """PARAM_VALUE: SERVOn_FUNCTION says which outputs drive motors."""
+    name = message.param_id.split(b"\0")[0]
+    number, value = name[5:-9], message.param_value
+    if not (name.startswith(b"SERVO") and name.endswith(b"_FUNCTION") and number.isdigit() and math.isfinite(value)):
+        return memory
+    channel = int(number)
+    if not 1 <= channel <= 32 or memory.stack is not Stack.ARDUPILOT:
+        return memory
+    watch = memory.watch
+    return memory._replace(watch=watch._replace(functions={**watch.functions, channel: int(value)}))
+
+
+def esc_telemetry(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
+    """ESC_TELEMETRY_n (ArduPilot): four motors."""
+    return _turning(memory, message, unpack("<4H", message.rpm), now)
+
+
+def esc_status(memory: Memory, message: mav.EscStatus, now: Instant, options: HardwareOptions) -> Memory:
+    """ESC_STATUS (PX4): four motors."""
+    return _turning(memory, message, unpack("<4i", message.rpm), now)
+
+
+def _turning(memory: Memory, message: Any, rpm: tuple[int, ...], now: Instant) -> Memory:
+    if not any(rpm):
+        return memory
+    return observed(memory, esc=heard(message, now.mono, memory.observation.esc))

@@ -1,0 +1,86 @@
+"""What is remembered of one vehicle: a value; each message gives the next one (`hearing`).
+
+It holds no clock and no socket, so a recording gives the same memory as the live link did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from ..clock import Instant
+from . import causes, estop, motion, outputs, sensors, statustext
+from .boot import Boot
+from .flight_mode import AvailableMode
+from .identity import Family, Stack, family_of, stack_of
+from .observation import Heard, Observation, heard
+from .pulse import Pulse, first_beat
+
+if TYPE_CHECKING:
+    from ..mavlink.definitions import Heartbeat
+
+NO_MODES: Final[Mapping[int, AvailableMode]] = {}
+
+
+class Said(NamedTuple):
+    """The autopilot's own words on something, and since when it says them."""
+
+    text: str
+    since: Instant
+    last: float
+
+
+class Memory(NamedTuple):
+    """One vehicle."""
+
+    observation: Observation
+    pulse: Pulse
+    boot: Boot
+    vehicle_type: int
+    autopilot: int
+    impostor: bool = False
+    """Whether this ArduPilot has shown that it is INAV."""
+    faults: sensors.Faults = sensors.NO_FAULTS
+    latches: causes.Latches = causes.NO_LATCHES
+    stop: estop.Stop = estop.NOTHING
+    motion: motion.Motion = motion.UNKNOWN
+    watch: outputs.Watch = outputs.NOT_WATCHED
+    texts: statustext.Assembly = statustext.EMPTY
+    modes: Mapping[int, AvailableMode] = NO_MODES
+    not_ready: Said | None = None
+    """Why it cannot be armed."""
+    failsafe: Said | None = None
+    """What it said of a failsafe that its state reports."""
+    internal_errors_since: Instant | None = None
+    assumed_free: bool = False
+    """`estop_assume_visible`: no e-stop was engaged when it was armed."""
+    event: int | None = None
+    """The sequence number of the latest EVENT."""
+    boots: int = 0
+    """Reboots seen."""
+
+    @property
+    def stack(self) -> Stack:
+        """The software on the autopilot."""
+        return stack_of(self.autopilot, self.impostor)
+
+    @property
+    def family(self) -> Family:
+        """The kind of vehicle."""
+        return family_of(self.vehicle_type)
+
+
+def begin(heartbeat: Heartbeat, now: Instant) -> Memory:
+    """The memory of a vehicle at its first heartbeat."""
+    return Memory(
+        observation=Observation(heartbeat=heard(heartbeat, now.mono, None)),
+        pulse=first_beat(heartbeat, now),
+        boot=Boot(now.mono),
+        vehicle_type=heartbeat.type,
+        autopilot=heartbeat.autopilot,
+    )
+
+
+def observed(memory: Memory, **what: Heard) -> Memory:
+    """The memory with these fields of its observation replaced."""
+    return memory._replace(observation=memory.observation._replace(**what))

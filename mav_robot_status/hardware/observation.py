@@ -1,0 +1,61 @@
+"""What was heard from one vehicle, and when: a value that each message replaces.
+
+Times are seconds on the monotonic clock of arrival.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+LONGEST_INTERVALS = 10.0  # seconds: three intervals of a slow stream count for at most this long
+REMEMBERED = 6  # arrivals, hence five intervals
+
+
+class Heard(NamedTuple):
+    """The latest message of one kind and the arrivals before it."""
+
+    message: Any
+    at: float
+    times: tuple[float, ...]
+    """The last arrivals, this one included."""
+
+
+def heard(message: Any, at: float, before: Heard | None) -> Heard:
+    """`message`, heard at `at` after `before`."""
+    if before is None:
+        return Heard(message, at, (at,))
+    times = before.times
+    return Heard(message, at, (*(times if len(times) < REMEMBERED else times[1:]), at))
+
+
+def is_fresh(what: Heard | None, now: float, least: float) -> bool:
+    """True while `what` is not older than `least` seconds, or than three measured intervals if that is longer."""
+    if what is None:
+        return False
+    age = now - what.at
+    return age <= least or (age <= LONGEST_INTERVALS and age <= 3 * interval(what))
+
+
+def interval(what: Heard) -> float:
+    """The median of the last intervals in seconds; 0 while there is none."""
+    times = what.times
+    if len(times) < 2:
+        return 0.0
+    gaps = sorted(b - a for a, b in pairwise(times))
+    return gaps[len(gaps) // 2]
+
+
+class Observation(NamedTuple):
+    """The latest message of each kind that a status is derived from; None until heard."""
+
+    heartbeat: Heard | None = None
+    sys_status: Heard | None = None
+    extended_sys_state: Heard | None = None
+    global_position: Heard | None = None
+    local_position: Heard | None = None
+    vfr_hud: Heard | None = None
+    attitude: Heard | None = None
+    current_mode: Heard | None = None
+    esc: Heard | None = None
+    """The latest ESC telemetry that showed a turning motor."""

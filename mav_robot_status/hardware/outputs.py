@@ -1,0 +1,141 @@
+"""The output watch: an emergency stop that nothing but the motor outputs shows.
+
+ArduPilot's motor e-stop forces the motor and throttle outputs to their stop value (`SRV_Channel::should_e_stop`) and
+changes neither HEARTBEAT nor SYS_STATUS while armed. The worst error is to call a live robot stopped, so "held" needs
+proof: the same channels have left their stop value since the last arming, throttle is demanded, and nothing moves
+faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from ..interface.status import TriState
+from .identity import HELICOPTER, Family
+
+if TYPE_CHECKING:
+    from .pulse import Pulse
+
+OFF_STOP: Final = 20  # us: further from the stop value than this is driven
+AT_STOP: Final = 5  # us: as near as this is held
+LEAST_PULSE: Final = 800  # us: an output of less is switched off, and teaches nothing
+DEMAND: Final = 15  # %: VFR_HUD.throttle from which an output at stop is suspicious
+HOLD: Final = 1.0  # s
+BEATS_APART: Final = 3.5  # s: a stop value counts only from between two disarmed heartbeats this near
+GROWTH: Final = 0.5  # m/s: a speed that has grown this much while held says that something drives
+
+# SERVOn_FUNCTION: 31 heli RSC, 33-40 and 82-85 and 160-179 motors, 70 throttle, 73/74 throttle left and right.
+MOTOR_FUNCTIONS: Final = frozenset({31, *range(33, 41), 70, 73, 74, *range(82, 86), *range(160, 180)})
+HELICOPTER_FUNCTIONS: Final = frozenset({31})  # the others may move its swash plate
+
+# Motor channels (from 1) where no parameter was heard, by MAV_TYPE: ArduPilot's defaults.
+ASSUMED_CHANNELS: Final[Mapping[int, tuple[int, ...]]] = {
+    2: (1, 2, 3, 4),
+    13: (1, 2, 3, 4, 5, 6),
+    14: (1, 2, 3, 4, 5, 6, 7, 8),
+    15: (1, 2, 4),
+    10: (3,),
+    11: (3,),
+    46: (),
+}
+HELD_FAMILIES: Final = frozenset({Family.COPTER, Family.ROVER})
+
+Outputs = tuple[int, ...]
+
+
+class Watch(NamedTuple):
+    """What the outputs have shown."""
+
+    functions: Mapping[int, int] = {}
+    """SERVOn_FUNCTION by channel, as far as heard."""
+    stop: Mapping[int, int] = {}
+    """The stop value of each motor channel, us."""
+    candidate: Outputs = ()
+    """Outputs while disarmed that wait for the next heartbeat to confirm the disarm."""
+    proved: bool = False
+    """Whether, since boot, a motor channel has left its stop value while throttle was demanded."""
+    driven_seen: bool = False
+    """Whether a motor was driven since the last arming."""
+    driven: bool = False
+    """Whether the latest outputs drive a motor."""
+    held_since: float | None = None
+    speed_then: float = 0.0
+    """Speed over ground of a rover when the hold began, m/s."""
+    at: float | None = None
+    """When the latest outputs arrived."""
+    values: Outputs = ()
+
+
+def channels(watch: Watch, vehicle_type: int) -> tuple[tuple[int, ...], bool]:
+    """The motor channels (from 1), and whether they are assumed."""
+    wanted = HELICOPTER_FUNCTIONS if vehicle_type == HELICOPTER else MOTOR_FUNCTIONS
+    known = tuple(sorted(c for c, function in watch.functions.items() if function in wanted))
+    if known:
+        return known, False
+    return ASSUMED_CHANNELS.get(vehicle_type, ()), True
+
+
+def heard_outputs(
+    watch: Watch, values: Outputs, vehicle_type: int, pulse: Pulse, throttle: float | None, speed: float, now: float
+) -> Watch:
+    """The watch after one more SERVO_OUTPUT_RAW; `throttle` in percent, None if not freshly heard."""
+    if not pulse.armed:
+        return watch._replace(candidate=values, driven=False, held_since=None, at=now, values=values)
+    motors, assumed = channels(watch, vehicle_type)
+    known = [(values[c - 1], watch.stop[c]) for c in motors if c in watch.stop and c <= len(values)]
+    off_stop = any(abs(value - stop) > OFF_STOP for value, stop in known)
+    at_stop = len(known) == len(motors) > 0 and all(abs(value - stop) <= AT_STOP for value, stop in known)
+    demanded = throttle is not None and throttle >= DEMAND
+    proved = watch.proved or (off_stop and demanded)
+    driven = off_stop and (proved or not assumed)
+    held_since, speed_then = watch.held_since, watch.speed_then
+    if not (at_stop and demanded and proved and watch.driven_seen):
+        held_since = None
+    elif held_since is None:
+        held_since, speed_then = now, speed
+    return watch._replace(
+        proved=proved,
+        driven=driven,
+        driven_seen=watch.driven_seen or driven,
+        held_since=held_since,
+        speed_then=speed_then,
+        at=now,
+        values=values,
+    )
+
+
+def heard_beat(
+    watch: Watch, pulse: Pulse, before: Pulse | None, outputs_enabled: bool, vehicle_type: int, now: float
+) -> Watch:
+    """The watch after one more heartbeat: stop values are learnt while disarmed, proofs end with each arming."""
+    if pulse.armed:
+        if before is not None and not before.armed:
+            return watch._replace(candidate=(), driven_seen=False, driven=False, held_since=None)
+        return watch
+    if before is None or before.armed or not watch.candidate:
+        return watch._replace(candidate=())
+    near = now - before.runs[-1].last <= BEATS_APART
+    if not (near and outputs_enabled):
+        return watch._replace(candidate=())
+    motors, _ = channels(watch, vehicle_type)
+    learnt = {c: watch.candidate[c - 1] for c in motors if c <= len(watch.candidate)}
+    stop = {c: value for c, value in learnt.items() if value >= LEAST_PULSE}
+    return watch._replace(stop=stop, candidate=())
+
+
+def verdict(watch: Watch, family: Family, vehicle_type: int, speed: float, now: float) -> TriState:
+    """TRUE held, FALSE driven, UNKNOWN neither (or not for long enough) at `now`."""
+    if watch.driven:
+        return TriState.FALSE
+    if watch.held_since is None or now - watch.held_since < HOLD:
+        return TriState.UNKNOWN
+    if family not in HELD_FAMILIES or vehicle_type == HELICOPTER:
+        return TriState.UNKNOWN
+    # a copter that is stopped falls, whatever it did before; a rover coasts
+    if speed - (watch.speed_then if family is Family.ROVER else 0.0) > GROWTH:
+        return TriState.UNKNOWN
+    return TriState.TRUE
+
+
+NOT_WATCHED: Final = Watch()

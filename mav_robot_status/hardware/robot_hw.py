@@ -1,0 +1,238 @@
+"""`MavlinkRobotHW`: the hardware interface. It takes frames, keeps a memory of each vehicle, and fills the handles.
+
+ros_control's walk: `take` what arrived, `read(time)` the robot into the handles, `write(time)` what is to be asked of
+it.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from ..interface import (
+    DEFAULT_HANDLE_NAME,
+    Detail,
+    IndustrialRobotStatusHandle,
+    IndustrialRobotStatusInterface,
+    LinkState,
+    RobotHW,
+    RobotStatus,
+)
+from ..mavlink import definitions as mav
+from ..mavlink.decode import decode
+from . import derive as rules
+from .hearing import HANDLERS, hear, pass_time
+from .identity import Stack, is_autopilot
+from .memory import begin
+from .options import HardwareOptions
+from .requests import Requests, wanted_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from ..clock import Instant
+    from ..mavlink.framing import Frame
+    from .memory import Memory
+
+log = logging.getLogger(__name__)
+
+MOST_VEHICLES: Final = 256
+STEP: Final = 0.1  # s between looks at a vehicle whose status may change by time alone
+WANTED_IDS: Final = frozenset(d.id for d in mav.MESSAGES.values() if d.type in HANDLERS or d.type is mav.CommandAck)
+
+
+class Slot(NamedTuple):
+    """A vehicle that is expected, and the name of its handle. None: any."""
+
+    system: int | None = None
+    component: int | None = None
+    handle: str = DEFAULT_HANDLE_NAME
+
+
+class Ask(NamedTuple):
+    """A message for the autopilot of one vehicle."""
+
+    system: int
+    component: int
+    message: Any
+
+
+class Tracked:
+    """One vehicle: its handle, and once it was heard its ids and memory."""
+
+    __slots__ = ("boots", "deadline", "dirty", "handle", "ids", "memory", "requests", "slot")
+
+    def __init__(self, slot: Slot) -> None:
+        self.slot = slot
+        self.handle = IndustrialRobotStatusHandle(slot.handle)
+        self.handle.detail = Detail(slot.system, slot.component, link=LinkState.NEVER_SEEN)
+        self.ids: tuple[int, int] | None = None
+        self.memory: Memory | None = None
+        self.requests: Requests | None = None
+        self.boots = 0
+        self.dirty = False
+        self.deadline = math.inf
+
+    def matches(self, system: int, component: int) -> bool:
+        """True if this is the place for a newly heard autopilot."""
+        return self.ids is None and self.slot.system in (None, system) and self.slot.component in (None, component)
+
+
+class MavlinkRobotHW(RobotHW):
+    """The vehicles heard on MAVLink links, as handles."""
+
+    def __init__(
+        self, options: HardwareOptions | None = None, slots: Sequence[Slot] = (), own_component: int = 192
+    ) -> None:
+        super().__init__()
+        self.options = options or HardwareOptions()
+        self.own_component = own_component
+        self.handles = IndustrialRobotStatusInterface()
+        self.register_interface(self.handles)
+        # a vehicle that is named exactly comes before one that is not
+        ordered = sorted(slots, key=lambda slot: (slot.system is None, slot.component is None))
+        self._expected = [Tracked(slot) for slot in ordered]
+        self._open = not slots
+        """Whether every autopilot heard becomes a handle."""
+        self._tracked: dict[tuple[int, int], Tracked] = {}
+        self.ignored = 0
+        """Heartbeats of autopilots that no entry of the configuration names, or beyond MOST_VEHICLES."""
+        for slot in slots:
+            self.handles.register_handle(next(t.handle for t in self._expected if t.slot is slot))
+
+    @property
+    def vehicles(self) -> Iterator[Tracked]:
+        """The vehicles heard so far."""
+        return iter(self._tracked.values())
+
+    def find(self, system: int, component: int) -> Tracked | None:
+        """The vehicle with these ids, if it was heard."""
+        return self._tracked.get((system, component))
+
+    def take(self, frame: Frame, now: Instant) -> Tracked | None:
+        """Take one frame. Returns the vehicle whose autopilot's heartbeat it is, None for everything else."""
+        ids = (frame.system, frame.component)
+        tracked = self._tracked.get(ids)
+        if frame.message_id == 0:
+            heartbeat = decode(frame)
+            if tracked is not None and not is_autopilot(heartbeat, frame.component):
+                return None
+            tracked = tracked or self._discover(heartbeat, ids, now)
+            if tracked is None:
+                return None
+            self._hear(tracked, heartbeat, now)
+            return tracked
+        if tracked is None or tracked.memory is None:
+            return None
+        message = decode(frame)
+        if tracked.requests is not None:
+            tracked.requests.arrived(frame.message_id, now.mono)
+            if type(message) is mav.CommandAck:
+                tracked.requests.acknowledged(message, (ids[0], self.own_component), now.mono)
+        self._hear(tracked, message, now)
+        return None
+
+    def read(self, now: Instant) -> None:
+        """Set the handles to what is so at `now`."""
+        for tracked in self._tracked.values():
+            if tracked.dirty or now.mono >= tracked.deadline:
+                self._evaluate(tracked, now)
+
+    def write(self, now: Instant) -> list[Ask]:
+        """What is to be asked of the autopilots at `now`. Not called on links where nothing may be sent."""
+        asks = []
+        for ids, tracked in self._tracked.items():
+            memory = tracked.memory
+            if memory is None or tracked.handle.detail.link is not LinkState.CONNECTED:
+                continue
+            if tracked.requests is None:
+                tracked.requests = Requests(*ids, now.mono)
+            wanted = wanted_of(memory.stack, memory.family, self.options.watch_outputs)
+            command = tracked.requests.due(now.mono, wanted, memory.stack is not Stack.ARDUPILOT)
+            if command is not None:
+                asks.append(Ask(*ids, command))
+        return asks
+
+    def next_due(self) -> float:
+        """When (monotonic seconds) `read` or `write` has something to do, if nothing arrives before."""
+        due = math.inf
+        for tracked in self._tracked.values():
+            due = min(due, tracked.deadline)
+            if tracked.requests is not None and tracked.handle.detail.link is LinkState.CONNECTED:
+                due = min(due, tracked.requests.next_due())
+        return due
+
+    def forget(self) -> None:
+        """Begin anew, as if nothing had been heard (a new segment of a log). Handles keep their vehicles."""
+        for tracked in self._tracked.values():
+            tracked.memory = None
+            tracked.dirty, tracked.deadline = False, math.inf
+            system, component = tracked.ids or (None, None)
+            tracked.handle.status = RobotStatus()
+            tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)
+            tracked.handle.heard_at = None
+            tracked.handle.evidence = {}
+
+    def _discover(self, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant) -> Tracked | None:
+        """The place of an autopilot that is heard for the first time."""
+        if not is_autopilot(heartbeat, ids[1]):
+            return None
+        tracked = next((t for t in self._expected if t.matches(*ids)), None)
+        if tracked is None and self._open and len(self._tracked) < MOST_VEHICLES:
+            name = DEFAULT_HANDLE_NAME if not self._tracked else f"{DEFAULT_HANDLE_NAME}/{ids[0]}.{ids[1]}"
+            tracked = Tracked(Slot(*ids, name))
+            self.handles.register_handle(tracked.handle)
+        if tracked is None:
+            self.ignored += 1
+            return None
+        tracked.ids = ids
+        self._tracked[ids] = tracked
+        names = rules.named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), rules.named(mav.TYPE_NAMES, heartbeat.type)
+        log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
+        return tracked
+
+    def _hear(self, tracked: Tracked, message: Any, now: Instant) -> None:
+        if tracked.memory is None:
+            tracked.memory = begin(message, now)
+        else:
+            tracked.memory = hear(tracked.memory, message, now, self.options)
+        tracked.dirty = True
+        if type(message) is mav.Heartbeat:
+            tracked.handle.heard_at = now.mono
+        if tracked.memory.boots != tracked.boots:
+            tracked.boots = tracked.memory.boots
+            log.info("vehicle %d.%d has rebooted", *(tracked.ids or (0, 0)))
+            if tracked.requests is not None:
+                tracked.requests.restart(now.mono)
+
+    def _evaluate(self, tracked: Tracked, now: Instant) -> None:
+        if tracked.memory is None or tracked.ids is None:
+            return
+        memory = tracked.memory = pass_time(tracked.memory, now, self.options)
+        handle = tracked.handle
+        derived = rules.derive(memory, tracked.ids, handle.detail, now, self.options)
+        self._log_link(tracked, derived.detail.link)
+        if derived.status != handle.status:
+            handle.status = derived.status
+        if derived.detail != handle.detail:
+            handle.detail = derived.detail
+        handle.evidence = derived.evidence
+        tracked.dirty = False
+        if derived.detail.link is LinkState.LOST:
+            tracked.deadline = math.inf
+        else:
+            beat = memory.observation.heartbeat
+            lost_at = math.nextafter((beat.at if beat else now.mono) + self.options.heartbeat_timeout, math.inf)
+            tracked.deadline = max(min(lost_at, now.mono + STEP), math.nextafter(now.mono, math.inf))
+
+    def _log_link(self, tracked: Tracked, state: LinkState) -> None:
+        before = tracked.handle.detail.link
+        ids = tracked.ids or (0, 0)
+        if state is LinkState.LOST and before is LinkState.CONNECTED:
+            log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, self.options.heartbeat_timeout)
+        elif state is LinkState.CONNECTED and before is LinkState.LOST:
+            log.info("vehicle %d.%d is back", *ids)
+            if tracked.requests is not None:
+                beat = tracked.handle.heard_at
+                tracked.requests.restart(beat if beat is not None else 0.0)

@@ -1,0 +1,38 @@
+"""The contract that hardware interfaces and controllers share; see `status`, `handle`, `registry`."""
+
+from .handle import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle
+from .publisher import MavlinkPort, Publisher, PublisherContext
+from .registry import IndustrialRobotStatusInterface, InterfaceManager, RobotHW
+from .status import (
+    Detail,
+    ErrorCause,
+    Evidence,
+    Inhibit,
+    LinkState,
+    RobotMode,
+    RobotStatus,
+    RobotStatusMsg,
+    TriState,
+    Vehicle,
+)
+
+__all__ = [
+    "DEFAULT_HANDLE_NAME",
+    "Detail",
+    "ErrorCause",
+    "Evidence",
+    "IndustrialRobotStatusHandle",
+    "IndustrialRobotStatusInterface",
+    "Inhibit",
+    "InterfaceManager",
+    "LinkState",
+    "MavlinkPort",
+    "Publisher",
+    "PublisherContext",
+    "RobotHW",
+    "RobotMode",
+    "RobotStatus",
+    "RobotStatusMsg",
+    "TriState",
+    "Vehicle",
+]

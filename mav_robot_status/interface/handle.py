@@ -1,0 +1,36 @@
+"""`IndustrialRobotStatusHandle`: the named place where a hardware interface puts a status and controllers read it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .status import Detail, RobotStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from .status import Evidence
+
+DEFAULT_HANDLE_NAME = "industrial_robot_status_handle"
+
+
+class IndustrialRobotStatusHandle:
+    """A name and the latest status under it.
+
+    ORIGINAL: the C++ handle points at a RobotStatus that the hardware interface changes in place. Here statuses are
+    values, and the hardware interface sets a new one; a reader can keep what it read.
+    """
+
+    __slots__ = ("detail", "evidence", "heard_at", "name", "status")
+
+    def __init__(self, name: str, status: RobotStatus | None = None) -> None:
+        self.name = name
+        self.status = status if status is not None else RobotStatus()
+        self.detail = Detail()
+        self.heard_at: float | None = None
+        """Monotonic seconds at which the robot's controller was last heard; None if never, or not told."""
+        self.evidence: Mapping[str, Evidence] = {}
+        """Why each field has its value; empty if the hardware interface does not tell."""
+
+    def __repr__(self) -> str:
+        return f"IndustrialRobotStatusHandle({self.name!r}, {self.status!r})"

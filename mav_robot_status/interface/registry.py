@@ -1,0 +1,66 @@
+"""Where handles are registered and found: ros_control's interface and interface manager."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
+
+from ..errors import MavRobotStatusError, UnknownHandleError
+
+if TYPE_CHECKING:
+    from .handle import IndustrialRobotStatusHandle
+
+log = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+
+class IndustrialRobotStatusInterface:
+    """The handles of one hardware interface, by name."""
+
+    def __init__(self) -> None:
+        self._handles: dict[str, IndustrialRobotStatusHandle] = {}
+
+    def register_handle(self, handle: IndustrialRobotStatusHandle) -> None:
+        """Make a handle known. A second registration of a name replaces the first, with a warning in the log."""
+        if handle.name in self._handles:
+            log.warning("replacing the handle '%s', which was registered before", handle.name)
+        self._handles[handle.name] = handle
+
+    def get_handle(self, name: str) -> IndustrialRobotStatusHandle:
+        """The handle of that name. Raises UnknownHandleError, which lists the names there are."""
+        try:
+            return self._handles[name]
+        except KeyError:
+            names = ", ".join(f"'{n}'" for n in self._handles) or "none"
+            raise UnknownHandleError(f"there is no handle '{name}'; registered: {names}") from None
+
+    def get_names(self) -> list[str]:
+        """The names of the registered handles, in the order of their registration."""
+        return list(self._handles)
+
+
+class InterfaceManager:
+    """The interfaces that a hardware interface offers, found by their type."""
+
+    def __init__(self) -> None:
+        self._interfaces: dict[type[object], object] = {}
+
+    def register_interface(self, interface: object) -> None:
+        """Offer an interface. A second one of the same type replaces the first, with a warning in the log."""
+        if type(interface) in self._interfaces:
+            log.warning("replacing the interface %s, which was registered before", type(interface).__name__)
+        self._interfaces[type(interface)] = interface
+
+    def get(self, kind: Callable[[], T]) -> T:
+        """The interface of that type. Raises MavRobotStatusError if there is none."""
+        interface = self._interfaces.get(kind)  # type: ignore[call-overload]
+        if interface is None:
+            wanted = getattr(kind, "__name__", kind)
+            raise MavRobotStatusError(f"this hardware offers no {wanted}")
+        return interface  # type: ignore[no-any-return]
+
+
+class RobotHW(InterfaceManager):
+    """ros_control's RobotHW: reads the robot into the handles, and writes what it has to say to the robot."""

@@ -1,0 +1,1 @@
+"""Bytes <-> messages: framing, decoding, encoding, who we are, and the generated dialect."""

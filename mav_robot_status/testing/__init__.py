@@ -1,0 +1,36 @@
+"""A fake autopilot and a manual clock: for the tests of this project and of its users, and for the demo.
+
+    >>> import socket
+    >>> from mav_robot_status.testing import FakeAutopilot, ardurover, decode
+    >>> with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as gateway:  # here: the program that you test
+    ...     gateway.bind(("127.0.0.1", 0))
+    ...     with FakeAutopilot(ardurover.READY, to=gateway.getsockname()) as autopilot:
+    ...         autopilot.arm()
+    ...         print(decode(gateway.recv(300))[0].get_type())
+    HEARTBEAT
+
+Scenarios are data: `scenarios` has those that come along, `step` and `Scenario` make your own. For tests
+that do not wait, call `FakeAutopilot.poll` with the instants of a `ManualClock` instead of using `with`.
+"""
+
+from .fake_autopilot import FakeAutopilot, decode
+from .manual_clock import ManualClock
+from .scenario import Action, Scenario, Step, Text, VehicleState, step
+from .scenarios import BY_NAME, DEMO, arducopter, ardurover, px4
+
+__all__ = [
+    "BY_NAME",
+    "DEMO",
+    "Action",
+    "FakeAutopilot",
+    "ManualClock",
+    "Scenario",
+    "Step",
+    "Text",
+    "VehicleState",
+    "arducopter",
+    "ardurover",
+    "decode",
+    "px4",
+    "step",
+]

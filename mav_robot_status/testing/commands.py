@@ -1,0 +1,141 @@
+"""What the vehicle answers to the messages that it gets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from ..mavlink.pymavlink_dialect import MAVLink_command_ack_message, MAVLink_param_value_message
+from .firmware import (
+    ACCEPTED,
+    ARDUPILOT,
+    DENIED,
+    FAILED,
+    IN_AIR,
+    LANDING,
+    PX4,
+    TAKEOFF,
+    UNSUPPORTED,
+    not_armable,
+    px4_mode,
+)
+from .messages import BUILDERS, can_send
+from .scenario import Text, step
+from .vehicle_model import VehicleModel
+
+CUSTOM_MODE_ENABLED = 1
+FORCED = 21196
+GCS = 6
+SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, ARM_DISARM, DO_SET_MODE, SET_MODE = 511, 512, 400, 176, 11
+STREAM_GROUPS = {2: (1,), 3: (36,), 6: (33, 32), 10: (30,), 11: (74,), 12: (2,)}
+"""ArduPilot's stream groups: which of our messages REQUEST_DATA_STREAM starts. 0 means all of them."""
+INT16 = 4
+
+
+def answer(model: VehicleModel, message: Any) -> None:
+    """Take one message that was received; what it causes is sent with the next `VehicleModel.run`."""
+    model.heard = True
+    model.gcs_heard |= message.get_type() == "HEARTBEAT" and message.type == GCS
+    if message.get_type() in ANSWERS:
+        ANSWERS[message.get_type()](model, message)
+
+
+def _command(model: VehicleModel, m: Any) -> None:
+    result = COMMANDS[m.command](model, m) if m.command in COMMANDS else UNSUPPORTED
+    _acknowledge(model, m, m.command, result)
+    if m.command == DO_SET_MODE and model.firmware.autopilot == PX4:
+        _acknowledge(model, m, m.command, result)  # PX4 answers this one twice
+
+
+def _acknowledge(model: VehicleModel, m: Any, command: int, result: int) -> None:
+    model.send(MAVLink_command_ack_message(command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent()))
+
+
+def _set_message_interval(model: VehicleModel, m: Any) -> int:
+    message_id, microseconds = m.param1, m.param2
+    if not can_send(model.firmware, message_id):
+        return FAILED
+    if microseconds == 0:
+        hz = model.default_streams.get(int(message_id))
+        model.request(int(message_id), 1 / hz if hz else None)
+    elif microseconds == -1:
+        model.request(int(message_id), None)
+    elif microseconds > 0:
+        model.request(int(message_id), min(max(microseconds / 1e6, 0.001), 60.0))
+    else:  # negative, or no number at all
+        return DENIED
+    return ACCEPTED
+
+
+def _request_message(model: VehicleModel, m: Any) -> int:
+    if not can_send(model.firmware, m.param1):
+        return UNSUPPORTED
+    model.send(BUILDERS[int(m.param1)](model.snapshot()))
+    return ACCEPTED
+
+
+def _arm_disarm(model: VehicleModel, m: Any) -> int:
+    arm, forced, state = m.param1 == 1, m.param2 == FORCED, model.state
+    if arm and not_armable(state) and not forced:
+        model.say(Text(2, model.firmware.arming_refused.format(not_armable(state))))
+        return model.firmware.refused
+    if not arm and state.armed and state.landed_state in (IN_AIR, TAKEOFF, LANDING) and not forced:
+        return model.firmware.refused
+    model.do(step(0.0, "", armed=arm))
+    return ACCEPTED
+
+
+def _do_set_mode(model: VehicleModel, m: Any) -> int:
+    if not all(map(math.isfinite, (m.param1, m.param2, m.param3))):
+        return DENIED
+    if model.firmware.autopilot == PX4:
+        return _take_mode(model, int(m.param1), px4_mode(int(m.param2) & 0xFF, int(m.param3) & 0xFF))
+    return _take_mode(model, int(m.param1), int(m.param2))
+
+
+def _set_mode(model: VehicleModel, m: Any) -> None:
+    command = SET_MODE if model.firmware.autopilot == ARDUPILOT else DO_SET_MODE
+    _acknowledge(model, m, command, _take_mode(model, m.base_mode, m.custom_mode))
+
+
+def _take_mode(model: VehicleModel, base_mode: int, custom_mode: int) -> int:
+    if not base_mode & CUSTOM_MODE_ENABLED:
+        return DENIED
+    if custom_mode not in model.firmware.base_modes:
+        model.say(Text(4, f"No such mode {custom_mode}"))
+        return FAILED
+    model.do(step(0.0, "", custom_mode=custom_mode))
+    return ACCEPTED
+
+
+def _request_data_stream(model: VehicleModel, m: Any) -> None:
+    if model.firmware.autopilot != ARDUPILOT:
+        return
+    groups = STREAM_GROUPS if m.req_stream_id == 0 else {m.req_stream_id}
+    for message_id in (i for group in groups for i in STREAM_GROUPS.get(group, ())):
+        model.request(message_id, 1 / m.req_message_rate if m.start_stop == 1 and m.req_message_rate else None)
+
+
+def _param_request_read(model: VehicleModel, m: Any) -> None:
+    """ArduPilot is silent about a parameter that it does not have; so is this."""
+    names = list(model.firmware.parameters)
+    name = m.param_id if m.param_index < 0 else names[m.param_index] if m.param_index < len(names) else ""
+    if name in model.firmware.parameters:
+        value = float(model.firmware.parameters[name])
+        model.send(MAVLink_param_value_message(name.encode(), value, INT16, len(names), m.param_index & 0xFFFF))
+
+
+COMMANDS: dict[int, Callable[[VehicleModel, Any], int]] = {
+    SET_MESSAGE_INTERVAL: _set_message_interval,
+    REQUEST_MESSAGE: _request_message,
+    ARM_DISARM: _arm_disarm,
+    DO_SET_MODE: _do_set_mode,
+}
+ANSWERS: dict[str, Callable[[VehicleModel, Any], None]] = {
+    "COMMAND_LONG": _command,
+    "COMMAND_INT": _command,
+    "SET_MODE": _set_mode,
+    "REQUEST_DATA_STREAM": _request_data_stream,
+    "PARAM_REQUEST_READ": _param_request_read,
+}

@@ -1,0 +1,109 @@
+"""ArduPilot Rover. Modes: 0 MANUAL, 4 HOLD, 10 AUTO, 16 INITIALISING."""
+
+from __future__ import annotations
+
+from ..firmwares import ARDUROVER
+from ..scenario import RC_RECEIVER, Action, Scenario, Step, step
+
+_HEALTH = ARDUROVER.ready.sensors_health
+_STOPPED = (0.0, 0.0, 0.0)
+
+_ARM_AND_DRIVE = (
+    step(3.0, "the driver arms", armed=True),
+    step(4.0, "the driver drives off", velocity=(1.0, 0.0, 0.0), throttle=31),
+)
+_AUTO = step(6.0, "AUTO: the mission drives", (6, "Mission: 1 WP"), custom_mode=10, velocity=(2.0, 0.0, 0.0))
+
+
+def _scenario(title: str, *steps: Step) -> Scenario:
+    return Scenario(title, ARDUROVER, ARDUROVER.ready, steps)
+
+
+READY = _scenario("disarmed in MANUAL, ready to be armed; nothing happens by itself")
+BOOT = Scenario("power on until ready to be armed", ARDUROVER, ARDUROVER.booting, ARDUROVER.boot)
+PREARM_FAILING = _scenario(
+    "cannot be armed for a while",
+    step(2.0, "the compass fails: so do the pre-arm checks", prearm="Compass not healthy", sensors_health=_HEALTH & ~4),
+    step(4.0, "the driver tries to arm and is refused", (2, "Arm: Compass not healthy")),
+    step(8.0, "the compass is back", prearm="", sensors_health=_HEALTH),
+)
+MANUAL = _scenario(
+    "armed and driven by hand",
+    *_ARM_AND_DRIVE,
+    step(8.0, "turning on the spot", velocity=_STOPPED, rates=(0.0, 0.0, 0.5), throttle=0),
+    step(11.0, "the driver stops", rates=_STOPPED),
+    step(13.0, "the driver disarms", armed=False),
+)
+AUTO = _scenario(
+    "a mission in AUTO",
+    *_ARM_AND_DRIVE,
+    _AUTO,
+    step(
+        12.0,
+        "the mission ends",
+        (6, "Reached waypoint #3"),
+        (5, "Mission Complete"),
+        velocity=_STOPPED,
+        throttle=0,
+    ),
+    step(15.0, "disarmed", armed=False),
+)
+RC_FAILSAFE = _scenario(
+    "the radio is lost in AUTO and comes back",
+    *_ARM_AND_DRIVE,
+    _AUTO,
+    step(
+        9.0,
+        "the radio is lost: CRITICAL, HOLD",
+        (4, "Radio Failsafe"),
+        custom_mode=4,
+        failsafe=True,
+        sensors_health=_HEALTH & ~RC_RECEIVER,
+        velocity=_STOPPED,
+        throttle=0,
+    ),
+    step(15.0, "the radio is back", (6, "Radio Failsafe Cleared"), failsafe=False, sensors_health=_HEALTH),
+    step(18.0, "the driver takes over in MANUAL", custom_mode=0),
+)
+SAFETY_SWITCH = _scenario(
+    "the hardware safety switch is pressed while armed, and again",
+    *_ARM_AND_DRIVE,
+    step(6.0, "safety switch on: the outputs are dead", safety_switch=True, throttle=0),
+    step(7.0, "the rover has rolled out", velocity=_STOPPED),
+    step(10.0, "safety switch off", safety_switch=False),
+)
+RC_ESTOP = _scenario(
+    "motor emergency stop by an RC switch in AUTO, then released",
+    *_ARM_AND_DRIVE,
+    _AUTO,
+    step(9.0, "emergency stop: no bit shows it, only a text", (6, "RC7: MotorEStop HIGH"), emergency_stop=True),
+    step(10.0, "the rover has rolled out, and AUTO asks for ever more throttle", velocity=_STOPPED, throttle=58),
+    step(12.0, "more throttle, to no avail", throttle=81),
+    step(
+        14.0,
+        "released: the rover drives on",
+        (6, "RC7: MotorEStop LOW"),
+        emergency_stop=False,
+        velocity=(2.0, 0.0, 0.0),
+        throttle=40,
+    ),
+)
+CRASH = _scenario(
+    "the rover runs into something",
+    *_ARM_AND_DRIVE,
+    _AUTO,
+    step(9.0, "it is stuck", velocity=_STOPPED, throttle=80),
+    step(11.0, "the crash check holds it", (0, "Crash: Going to HOLD"), custom_mode=4, throttle=0),
+    step(15.0, "the driver disarms", armed=False),
+)
+LINK_SILENCE = _scenario(
+    "the link is silent for 6 s while the rover drives",
+    *_ARM_AND_DRIVE,
+    step(8.0, "the link is cut", action=Action.SILENCE),
+    step(14.0, "the link is back", action=Action.RESUME),
+)
+REBOOT = _scenario(
+    "the autopilot reboots while armed",
+    *_ARM_AND_DRIVE,
+    step(8.0, "the autopilot reboots", action=Action.REBOOT),
+)

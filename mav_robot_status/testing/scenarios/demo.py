@@ -1,0 +1,84 @@
+"""The story of the `demo` command: half a minute of a rover, in which the status changes for reasons to follow."""
+
+from __future__ import annotations
+
+from ..firmwares import ARDUROVER
+from ..scenario import RC_RECEIVER, Action, Scenario, step
+
+_HEALTH = ARDUROVER.ready.sensors_health
+_STOPPED = (0.0, 0.0, 0.0)
+
+DEMO = Scenario(
+    "a rover from power-on to power-off",
+    ARDUROVER,
+    ARDUROVER.booting,
+    steps=(
+        step(0.0, "power on: the autopilot initialises, nobody is in charge yet"),
+        *ARDUROVER.boot[:-1],
+        step(2.1, "the autopilot says why it cannot be armed", (2, "PreArm: GPS 1: Bad fix")),
+        ARDUROVER.boot[-1],
+        step(8.5, "the driver arms: the drives are powered", armed=True),
+        step(10.0, "the driver drives off in MANUAL", velocity=(1.0, 0.0, 0.0), throttle=31),
+        step(
+            12.5,
+            "AUTO: the mission is in charge now",
+            (6, "Mission: 1 WP"),
+            custom_mode=10,
+            velocity=(2.0, 0.0, 0.0),
+            throttle=40,
+        ),
+        step(
+            15.0,
+            "the radio is lost: failsafe, the rover stops in HOLD. That is an error",
+            (4, "Radio Failsafe"),
+            custom_mode=4,
+            failsafe=True,
+            sensors_health=_HEALTH & ~RC_RECEIVER,
+            velocity=_STOPPED,
+            throttle=0,
+        ),
+        step(
+            17.5,
+            "the radio is back: the error clears, the rover still holds",
+            (6, "Radio Failsafe Cleared"),
+            failsafe=False,
+            sensors_health=_HEALTH,
+        ),
+        step(
+            18.5,
+            "AUTO again: the mission goes on",
+            (6, "Mission: 1 WP"),
+            custom_mode=10,
+            velocity=(2.0, 0.0, 0.0),
+            throttle=40,
+        ),
+        step(
+            20.5,
+            "emergency stop by a switch of the remote control: armed, but the drives are off",
+            (6, "RC7: MotorEStop HIGH"),
+            emergency_stop=True,
+        ),
+        step(21.0, "the rover has rolled out", velocity=_STOPPED, throttle=58),
+        step(
+            22.5,
+            "emergency stop released: it drives on",
+            (6, "RC7: MotorEStop LOW"),
+            emergency_stop=False,
+            velocity=(2.0, 0.0, 0.0),
+            throttle=40,
+        ),
+        step(24.0, "it runs into a wall", velocity=_STOPPED, throttle=80),
+        step(
+            24.5,
+            "the crash check holds it: an error that stays until it is armed again",
+            (0, "Crash: Going to HOLD"),
+            custom_mode=4,
+            throttle=0,
+        ),
+        step(26.5, "the driver disarms", armed=False),
+        step(27.5, "the link is cut: soon nothing is known any more", action=Action.SILENCE),
+        step(32.5, "the link is back, and so is the status", action=Action.RESUME),
+        step(34.0, "the end", action=Action.END),
+    ),
+    streams={1: 2.0, 245: 2.0, 33: 4.0, 30: 4.0, 74: 2.0, 2: 1.0, 36: 2.0},
+)

@@ -1,0 +1,192 @@
+"""`VehicleModel`: which messages are due when. No socket, no thread, no clock: times come in, messages go out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from ..clock import Instant
+from ..mavlink.pymavlink_dialect import MAVLink_message
+from .firmware import ARDUPILOT, not_armable
+from .messages import BUILDERS, HEARTBEAT, SYS_STATUS, Snapshot, heartbeat, statustexts
+from .scenario import Action, Scenario, Step, Text
+
+REBOOT_GAP = 1.2
+"""Seconds from the command to the first HEARTBEAT of the new boot, as recorded."""
+PREARM_TICK = -1
+"""Stands among the streams: the pre-arm checks run once a second."""
+PREARM_REPEAT = 30.0
+"""Seconds after which ArduPilot repeats why it cannot be armed."""
+SAME_TIME = 1e-6
+"""Seconds: what is due so little later is due now, for sums of intervals are not exact."""
+CATCH_UP = 10.0
+"""Seconds of streams that are made up for after a pause; more would flood the receiver."""
+
+
+class Outgoing(NamedTuple):
+    """A message and the sequence number that it is sent with."""
+
+    message: MAVLink_message
+    seq: int
+
+
+class VehicleModel:
+    """One vehicle that plays a scenario. `start` and all times are seconds on a monotonic clock.
+
+    `speed` makes the scenario's steps pass faster; the streams keep their rates. `tell` is called with each step.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        start: float,
+        speed: float = 1.0,
+        loop: bool = False,
+        tell: Callable[[Step], None] = lambda step: None,
+    ) -> None:
+        self.scenario = scenario
+        self.firmware = scenario.firmware
+        self.state = scenario.start
+        self._speed = speed
+        self._loop = loop
+        self._tell = tell
+        self._out: list[Outgoing] = []
+        self._now = start
+        self._unix_us = 0
+        self._schedule: list[tuple[float, Step]] = []
+        self._power_on(start)
+
+    def _power_on(self, at: float) -> None:
+        self.state = self.scenario.start
+        self.silent = self.ended = False
+        self._schedule = []
+        self._plan(at, self.scenario.steps)
+        self._boot(at)
+
+    def _boot(self, at: float) -> None:
+        """All that a reboot forgets."""
+        self.boot = at
+        self._seq = 0
+        self._texts = 0
+        self.heard = self.gcs_heard = False
+        self._prearm_ok = not not_armable(self.state)
+        self._prearm_said = at
+        self._intervals = {HEARTBEAT: 1.0, PREARM_TICK: 1.0}
+        self._intervals |= {message: 1 / hz for message, hz in self.default_streams.items()}
+        self._due = {message: at + interval for message, interval in self._intervals.items()}
+        self._due[HEARTBEAT] = at
+
+    def _plan(self, start: float, steps: Iterable[Step]) -> None:
+        self._schedule += [(start + step.at / self._speed, step) for step in steps]
+        self._schedule.sort(key=lambda planned: planned[0])
+
+    @property
+    def default_streams(self) -> dict[int, float]:
+        """Message id to Hz: what flows without being asked for."""
+        streams = self.scenario.streams
+        return dict(self.firmware.streams if streams is None else streams)
+
+    @property
+    def finished(self) -> bool:
+        """True when no step is left."""
+        return self.ended or not self._schedule
+
+    @property
+    def listening(self) -> bool:
+        """True if the vehicle could hear a message now."""
+        return not (self.silent or self.ended) and self._now >= self.boot
+
+    def run(self, now: Instant) -> list[Outgoing]:
+        """Let time pass until `now`; all that became due, in order."""
+        unix_at_zero = now.unix_us - now.mono * 1e6
+        for message, due in self._due.items():
+            self._due[message] = max(due, now.mono - CATCH_UP)
+        while (at := min(self._next_step(), *self._due.values())) <= now.mono + SAME_TIME and not self.ended:
+            self._at(at, unix_at_zero)
+            if self._next_step() <= at:
+                self.do(self._schedule.pop(0)[1])
+            else:
+                self._stream(min(self._due, key=self._due.__getitem__))
+        self._at(now.mono, unix_at_zero)
+        out, self._out = self._out, []
+        return out
+
+    def _next_step(self) -> float:
+        return self._schedule[0][0] if self._schedule else float("inf")
+
+    def _at(self, mono: float, unix_at_zero: float) -> None:
+        self._now = mono
+        self._unix_us = round(unix_at_zero + mono * 1e6)
+
+    def _stream(self, message_id: int) -> None:
+        self._due[message_id] += self._intervals[message_id]
+        if message_id == PREARM_TICK:
+            self._check_prearm()
+        elif self.state.initialised or message_id != SYS_STATUS:
+            self.send(BUILDERS[message_id](self.snapshot()))
+
+    def _check_prearm(self) -> None:
+        """ArduPilot announces failing checks when they begin to fail, and every 30 s."""
+        before, reason = self._prearm_ok, not_armable(self.state)
+        self._prearm_ok = self.state.armed or not reason
+        if self._prearm_ok or not self.firmware.prearm_prefix:
+            return
+        if before or self._now - self._prearm_said >= PREARM_REPEAT:
+            self._prearm_said = self._now
+            self.say(Text(2, self.firmware.prearm_prefix + reason))
+
+    def snapshot(self) -> Snapshot:
+        """All that a message is made of, as of now."""
+        boot_ms = round(max(0.0, self._now - self.boot) * 1000)
+        return Snapshot(self.firmware, self.state, self._prearm_ok, boot_ms, self._unix_us)
+
+    def send(self, message: MAVLink_message) -> None:
+        """Send a message now. What a cut link swallows is counted by its sequence number nevertheless."""
+        if self._now < self.boot or self.ended:
+            return
+        if not self.silent:
+            self._out.append(Outgoing(message, self._seq))
+        self._seq = (self._seq + 1) % 256
+
+    def say(self, text: Text) -> None:
+        """Send a STATUSTEXT: ArduPilot where it heard something or streams flow, PX4 only to a ground station."""
+        streaming = len(self._intervals) > 2
+        if self.heard or streaming if self.firmware.autopilot == ARDUPILOT else self.gcs_heard:
+            self._texts = self._texts % 0xFFFF + 1
+            for message in statustexts(self.firmware, text, self._texts):
+                self.send(message)
+
+    def do(self, step: Step) -> None:
+        """Take a step now: a scenario's own, or one from outside."""
+        before, self.state = self.state, self.state._replace(**step.changes)
+        if step.note:
+            self._tell(step)
+        # A mode change is told at once, arming only by the next regular HEARTBEAT; PX4 hurries with neither.
+        if self.state.custom_mode != before.custom_mode and self.firmware.autopilot == ARDUPILOT:
+            self.send(heartbeat(self.snapshot()))
+        for text in step.texts:
+            self.say(text)
+        if self.state.armed != before.armed:
+            self.say(Text(6, self.firmware.armed_text if self.state.armed else self.firmware.disarmed_text))
+        if step.action is not None:
+            self._act(step.action)
+
+    def _act(self, action: Action) -> None:
+        if action in (Action.SILENCE, Action.RESUME):
+            self.silent = action is Action.SILENCE
+        elif action is Action.REBOOT:
+            self.state = self.firmware.booting
+            self._boot(self._now + REBOOT_GAP)
+            self._plan(self.boot, self.firmware.boot)
+        elif self._loop:
+            self._power_on(self._now + REBOOT_GAP)
+        else:
+            self.ended = True
+
+    def request(self, message_id: int, interval: float | None) -> None:
+        """Stream a message every `interval` seconds from now on; None stops it."""
+        self._intervals.pop(message_id, None)
+        self._due.pop(message_id, None)
+        if interval is not None:
+            self._intervals[message_id] = interval
+            self._due[message_id] = self._now + interval

@@ -1,0 +1,246 @@
+"""Files that are right: what they mean, in values and in words."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from mav_robot_status.config import (
+    Config,
+    ControllerConfig,
+    IdentityConfig,
+    LinkConfig,
+    PublisherConfig,
+    VehicleConfig,
+    describe,
+    load,
+)
+from mav_robot_status.hardware.options import HardwareOptions
+from mav_robot_status.interface import RobotMode
+
+EXAMPLES = sorted((Path(__file__).parents[3] / "config").glob("*.yaml"))
+
+CONTRACT = """\
+    links:                                              # URLs, or mappings
+      - udp:127.0.0.1:14550
+      - {url: "/dev/ttyAMA0:921600", passive: true}
+    outs: ["udpout:192.168.1.20:14550"]
+    vehicles:
+      - {system: 1, handle: industrial_robot_status_handle}
+    identity: {system: auto, component: 192}
+    hardware: {heartbeat_timeout: 3.5, hover_is_motion: true}        # the options of design/semantics.md 12
+    requests: missing                                                # or none
+
+    robot_status_controller:                            # any other top-level mapping with a type is a controller
+      type: mav_robot_status/IndustrialRobotStatusController
+      handle_name: industrial_robot_status_handle       # the default
+      publish_rate: 10                                  # Hz, the default; <= 0 publishes nothing periodically
+      publish_on_change: true                           # the default
+      publishers: [json, mavlink]                       # names, or mappings with a type and options
+"""
+
+PASTED = """\
+# as in the documentation of industrial_robot_status_controller
+robot_status_controller:
+  type: industrial_robot_status_controller/IndustrialRobotStatusController
+  handle_name: industrial_robot_status_handle
+  publish_rate: 10.0
+"""
+
+
+def loaded(tmp_path: Path, text: str) -> Config:
+    path = tmp_path / "c.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load(path)
+
+
+def test_there_are_examples() -> None:
+    assert {"one_vehicle_udp.yaml", "two_controllers.yaml", "two_vehicles.yaml"} <= {path.name for path in EXAMPLES}
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
+def test_every_example_loads_and_is_described(path: Path) -> None:
+    config = load(path)
+    lines = describe(config)
+    assert config.links
+    assert config.controllers
+    for vehicle in config.vehicles:
+        assert any(vehicle.handle in line for line in lines)
+    for controller in config.controllers:
+        assert any(line.startswith(f"controller {controller.name}: ") for line in lines)
+
+
+def test_the_stanza_of_the_contract_means_what_the_contract_says(tmp_path: Path) -> None:
+    config = loaded(tmp_path, CONTRACT)
+    publishers = (PublisherConfig("json"), PublisherConfig("mavlink"))
+    assert config == Config(
+        links=(LinkConfig("udp:127.0.0.1:14550"), LinkConfig("/dev/ttyAMA0:921600", passive=True)),
+        outs=(LinkConfig("udpout:192.168.1.20:14550"),),
+        vehicles=(VehicleConfig(1, None, "industrial_robot_status_handle"),),
+        controllers=(
+            ControllerConfig(
+                name="robot_status_controller",
+                type="mav_robot_status/IndustrialRobotStatusController",
+                parameters={
+                    "handle_name": "industrial_robot_status_handle",
+                    "publish_rate": 10,
+                    "publish_on_change": True,
+                    "publishers": ["json", "mavlink"],
+                },
+                where=f"{tmp_path / 'c.yaml'}:11:5",
+                publishers=publishers,
+            ),
+        ),
+    )
+
+
+def test_the_stanza_of_the_contract_is_the_one_in_the_contract() -> None:
+    contract = Path(__file__).parents[4] / "shared" / "design" / "contract.md"
+    if not contract.exists():
+        pytest.skip("the contract is not beside this checkout")
+    assert CONTRACT in contract.read_text(encoding="utf-8")
+
+
+def test_a_stanza_pasted_from_ros_control_loads(tmp_path: Path) -> None:
+    config = loaded(tmp_path, PASTED)
+    (controller,) = config.controllers
+    assert controller.type == "industrial_robot_status_controller/IndustrialRobotStatusController"
+    assert controller.parameters == {"handle_name": "industrial_robot_status_handle", "publish_rate": 10.0}
+    assert controller.publishers is None
+    assert config.vehicles == ()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "\n", "# nothing\n", "---\n", "---\n...\n", "{}", "links:\nhardware:\n", "\ufeff"]
+)
+def test_an_empty_file_is_the_defaults(tmp_path: Path, text: str) -> None:
+    assert loaded(tmp_path, text) == Config()
+
+
+def test_every_hardware_option_is_read(tmp_path: Path) -> None:
+    text = """\
+hardware:
+  heartbeat_timeout: 5
+  sys_status_timeout: 800 ms
+  hover_is_motion: false
+  manual_blocks_motion: yes
+  estop_unknown_as: false
+  estop_assume_visible: true
+  watch_outputs: off
+  link_loss_is_error: true
+  treat_hil_as_live: true
+  text_hold_s: 0
+  v_on: 1
+  v_off: 0.5
+  v_on_disarmed: 2
+  v_off_disarmed: 1.5
+  mode_overrides: {copter: {77: AUTO, 78: MANUAL}, other: {4294967295: UNKNOWN}}
+  ignore_sensors: [3D_MAG, LEAK]
+  request_events: true
+"""
+    hardware = loaded(tmp_path, text).hardware
+    assert hardware == HardwareOptions(
+        heartbeat_timeout=5.0,
+        sys_status_timeout=0.8,
+        hover_is_motion=False,
+        manual_blocks_motion=True,
+        estop_unknown_as="false",
+        estop_assume_visible=True,
+        watch_outputs=False,
+        link_loss_is_error=True,
+        treat_hil_as_live=True,
+        text_hold_s=0.0,
+        v_on=1.0,
+        v_off=0.5,
+        v_on_disarmed=2.0,
+        v_off_disarmed=1.5,
+        mode_overrides={
+            "copter": {77: RobotMode.AUTO, 78: RobotMode.MANUAL},
+            "other": {4294967295: RobotMode.UNKNOWN},
+        },
+        ignore_sensors=frozenset({"3D_MAG", "LEAK"}),
+        request_events=True,
+    )
+    assert isinstance(hardware.heartbeat_timeout, float)
+    default = HardwareOptions()
+    assert all(getattr(hardware, option.name) != getattr(default, option.name) for option in fields(default))
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("0", 0.0), ("0.01", 0.01), ("10 ms", 0.01), ("10ms", 0.01), ("'0.5 s'", 0.5), ("1", 1.0)]
+)
+def test_a_duration_may_have_a_unit(tmp_path: Path, text: str, seconds: float) -> None:
+    assert loaded(tmp_path, f"coalesce: {text}").coalesce == pytest.approx(seconds)
+
+
+def test_auto_and_any_are_none(tmp_path: Path) -> None:
+    config = loaded(tmp_path, "vehicles: [{system: auto, component: any, handle: a}]\nidentity: {system: auto}")
+    assert config.vehicles == (VehicleConfig(None, None, "a"),)
+    assert config.identity == IdentityConfig(None, 192, True)
+
+
+def test_a_publisher_may_have_options(tmp_path: Path) -> None:
+    text = (
+        "c:\n  type: mav_robot_status/IndustrialRobotStatusController\n"
+        "  publishers: [json, {type: json, file: out.jsonl, nested: {1: [2, null]}}]\n"
+    )
+    (controller,) = loaded(tmp_path, text).controllers
+    second = PublisherConfig("json", {"file": "out.jsonl", "nested": {"1": [2, None]}})
+    assert controller.publishers == (PublisherConfig("json"), second)
+
+
+def test_the_parameters_of_another_type_are_its_own_affair(tmp_path: Path) -> None:
+    (controller,) = loaded(tmp_path, "mine: {type: theirs/Controller, publish_rate: fast, day: 2026-11-20}").controllers
+    assert controller.parameters == {"publish_rate": "fast", "day": "2026-11-20"}
+    assert controller.publishers is None
+
+
+def test_a_file_is_described_line_by_line(tmp_path: Path) -> None:
+    text = """\
+vehicles: [{system: 2, component: 1, handle: a}, {handle: b}]
+identity: {system: 7, heartbeat: false}
+hardware: {v_on: 0.4, ignore_sensors: [GPS, AHRS], mode_overrides: {copter: {77: AUTO}}, watch_outputs: false}
+requests: none
+coalesce: 10 ms
+one: {type: mav_robot_status/IndustrialRobotStatusController, handle_name: a, publishers: [json, mavlink]}
+two:
+  type: mav_robot_status/IndustrialRobotStatusController
+  handle_name: b
+  publish_rate: 0
+  publish_on_change: false
+three: {type: theirs/Controller, colour: red}
+"""
+    assert describe(loaded(tmp_path, text)) == [
+        "link: none in the file; give one on the command line",
+        "vehicle: system 2, component 1 -> handle 'a'",
+        "vehicle: the first system heard that no other entry names, any autopilot component -> handle 'b'",
+        "identity: system 7, component 192, without a HEARTBEAT of its own",
+        "hardware: watch_outputs = false (default true)",
+        "hardware: v_on = 0.4 (default 0.3)",
+        "hardware: mode_overrides = copter: {77: AUTO} (default none)",
+        "hardware: ignore_sensors = AHRS, GPS (default none)",
+        "requests: nothing is asked of the autopilot",
+        "coalesce: input gathers for 10 ms before it is read",
+        "controller one: handle 'a' at 10 Hz and on change to json, mavlink",
+        "controller two: handle 'b' never to the default publisher",
+        "controller three: type theirs/Controller, which checks its own parameters (colour)",
+    ]
+
+
+def test_nothing_is_described_as_the_defaults() -> None:
+    assert describe(Config()) == [
+        "link: none in the file; give one on the command line",
+        "vehicle: every autopilot that is heard, each with a handle of its own",
+        "identity: the vehicle's own system, component 192, with a HEARTBEAT of its own",
+        "requests: messages that are needed and do not come are asked for",
+        "controller: the default one for each handle",
+    ]
+
+
+def test_yaml_is_imported_only_when_a_file_is_read() -> None:
+    code = "import sys, mav_robot_status.config as c; c.Config(); sys.exit('yaml' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

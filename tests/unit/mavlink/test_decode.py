@@ -1,0 +1,78 @@
+"""Messages out of frames, as pymavlink decodes them; arrays stay raw."""
+
+from __future__ import annotations
+
+import math
+import random
+import struct
+from typing import Any
+
+import pytest
+
+from mav_robot_status.mavlink import pymavlink_dialect
+from mav_robot_status.mavlink.decode import decode, text
+from mav_robot_status.mavlink.definitions import MESSAGES, Definition
+from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.framing import Frame, Parser
+
+CODES = {"uint8_t": "B", "uint16_t": "H", "int32_t": "i", "float": "f"}
+
+
+def raw(message: Any, name: str, size: int) -> bytes:
+    """An array of a pymavlink message as the bytes it had on the wire."""
+    value = getattr(message, f"_{name}_raw", getattr(message, name))
+    if isinstance(value, list):
+        kind = message.fieldtypes[message.fieldnames.index(name)]
+        return struct.pack(f"<{len(value)}{CODES[kind]}", *value)
+    return bytes(value).ljust(size, b"\0")
+
+
+@pytest.mark.parametrize("definition", MESSAGES.values(), ids=lambda d: d.name)
+def test_every_message_decodes_as_pymavlink_decodes_it_trimmed_or_not(definition: Definition) -> None:
+    rng = random.Random(definition.id)
+    for zeros in [0, 0, 1, 2, 3, definition.layout.size // 2, definition.layout.size]:
+        body = bytes(rng.randrange(256) for _ in range(definition.layout.size - zeros)).ljust(
+            definition.layout.size, b"\0"
+        )
+        data = encode(definition.type._make(definition.layout.unpack(body)), system=1, component=1, sequence=0)
+        ours = decode(Parser(MESSAGES).feed(data)[0])
+        theirs = pymavlink_dialect.MAVLink(None).parse_char(data)
+        assert theirs
+        assert type(ours) is definition.type
+        assert list(ours._fields) == theirs.ordered_fieldnames
+        for name, value in ours._asdict().items():
+            if isinstance(value, bytes):
+                assert value == raw(theirs, name, len(value))
+            else:
+                other = getattr(theirs, name)
+                assert value == other or (math.isnan(value) and math.isnan(other))
+
+
+def test_bytes_beyond_the_layout_are_ignored() -> None:
+    frame = Frame(245, 1, 1, 0, b"\x01\x02of a newer definition", b"", 2)
+    assert decode(frame) == MESSAGES[245].type(vtol_state=1, landed_state=2)
+
+
+def test_a_short_mavlink_1_payload_without_extensions_is_filled_up() -> None:
+    frame = Frame(77, 1, 1, 0, b"\x90\x01\x04", b"", 1)
+    assert decode(frame) == MESSAGES[77].type(400, 4, 0, 0, 0, 0)
+
+
+def test_a_message_that_is_not_used_is_none() -> None:
+    assert decode(Frame(24, 1, 1, 0, bytes(30), b"", 2)) is None
+
+
+@pytest.mark.parametrize(
+    ("chars", "expected"),
+    [
+        (b"", ""),
+        (b"\0\0", ""),
+        (b"Armed\0\0\0", "Armed"),
+        (b"full, no NUL", "full, no NUL"),
+        (b"cut\0 here", "cut"),
+        ("22 \u00b0C".encode(), "22 \u00b0C"),
+        (b"bad \xff byte", "bad \ufffd byte"),
+    ],
+)
+def test_text_ends_at_the_first_nul(chars: bytes, expected: str) -> None:
+    assert text(chars) == expected

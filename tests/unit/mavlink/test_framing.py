@@ -1,0 +1,366 @@
+"""Frames out of bytes: whole, cut, damaged, foreign and hostile, with pymavlink as the second opinion."""
+
+from __future__ import annotations
+
+import itertools
+import pathlib
+import random
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega
+
+from mav_robot_status.mavlink import pymavlink_dialect
+from mav_robot_status.mavlink.definitions import CRC_EXTRA, MESSAGES, Attitude, Heartbeat, Statustext
+from mav_robot_status.mavlink.encode import Encoder, encode
+from mav_robot_status.mavlink.framing import MAX_FRAME, MAX_IDS, MAX_SOURCES, OTHER_IDS, Counters, Frame, Parser
+
+RECORDINGS = sorted((pathlib.Path(__file__).parents[4] / "shared" / "recordings" / "sitl").glob("*.tlog"))
+HEARTBEAT = Heartbeat(custom_mode=4, type=2, autopilot=3, base_mode=209, system_status=4, mavlink_version=3)
+ATTITUDE = Attitude(1, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
+UNKNOWN_ID = 0x7A0001
+
+
+def heartbeat(sequence: int = 0, system: int = 1, component: int = 1, version: int = 2) -> bytes:
+    return encode(HEARTBEAT, system=system, component=component, sequence=sequence, version=version)
+
+
+def unknown_frame(payload: bytes = b"abc", sequence: int = 0) -> bytes:
+    header = bytes([0xFD, len(payload), 0, 0, sequence, 1, 1]) + UNKNOWN_ID.to_bytes(3, "little")
+    return header + payload + b"\x01\x02"
+
+
+def random_stream(seed: int, length: int) -> list[bytes]:
+    """Frames of every message we use, in both versions, with random fields."""
+    rng = random.Random(seed)
+    frames = []
+    for sequence in range(length):
+        d = rng.choice(list(MESSAGES.values()))
+        body = bytes(rng.choice((0, rng.randrange(256))) for _ in range(d.layout.size))
+        message = d.type._make(d.layout.unpack(body))
+        version = rng.choice((1, 2)) if d.id < 256 else 2
+        frames.append(encode(message, system=1, component=1, sequence=sequence % 256, version=version))
+    return frames
+
+
+STREAM = random_stream(1, 60)
+
+
+def feed(*pieces: bytes) -> tuple[list[Frame], Counters]:
+    parser = Parser(CRC_EXTRA)
+    return [frame for piece in pieces for frame in parser.feed(piece)], parser.counters
+
+
+def key(frame: Frame) -> tuple[Any, ...]:
+    return frame.message_id, frame.system, frame.component, frame.sequence, frame.payload
+
+
+def pymavlink_frames(data: bytes, dialect: Any = ardupilotmega) -> list[tuple[Any, ...]]:
+    """What pymavlink accepts of these bytes, unknown ids apart."""
+    mav = dialect.MAVLink(None)
+    mav.robust_parsing = True
+    accepted = []
+    for m in mav.parse_buffer(data) or []:
+        if m.get_msgId() in dialect.mavlink_map:
+            wire = m.get_msgbuf()
+            start = 10 if wire[0] == 0xFD else 6
+            payload = bytes(wire[start : start + wire[1]])
+            accepted.append((m.get_msgId(), m.get_srcSystem(), m.get_srcComponent(), m.get_seq(), payload))
+    return accepted
+
+
+def test_a_frame_is_cut_into_its_parts() -> None:
+    (frame,), counters = feed(heartbeat(sequence=7, system=3, component=100))
+    assert frame == Frame(0, 3, 100, 7, bytes.fromhex("04000000 02 03 d1 04 03"), b"", 2)
+    assert counters == Counters(frames=1)
+
+
+def test_mavlink_1_is_understood_and_counted() -> None:
+    (frame,), counters = feed(heartbeat(sequence=7, system=3, component=100, version=1))
+    assert frame == Frame(0, 3, 100, 7, bytes.fromhex("04000000 02 03 d1 04 03"), b"", 1)
+    assert counters == Counters(frames=1, frames_v1=1)
+
+
+def test_only_wanted_frames_come_out_but_all_known_ones_are_counted() -> None:
+    parser = Parser({0})
+    encoder = Encoder(1, 1)
+    frames = parser.feed(encoder.frame(ATTITUDE) + encoder.frame(HEARTBEAT) + encoder.frame(ATTITUDE))
+    assert [f.message_id for f in frames] == [0]
+    assert parser.counters == Counters(frames=3)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_pymavlink_reads_the_same_frames(seed: int) -> None:
+    data = b"".join(random_stream(seed, 300))
+    frames, counters = feed(data)
+    assert [key(f) for f in frames] == pymavlink_frames(data, pymavlink_dialect)
+    assert counters.frames == len(frames) == 300
+    assert counters.lost == counters.garbage_bytes == 0
+
+
+def test_pymavlink_reads_the_same_frames_of_a_full_dialect() -> None:
+    rng = random.Random(2)
+    mav = ardupilotmega.MAVLink(None, 1, 1)
+    data = b""
+    for message_id, kind in ardupilotmega.mavlink_map.items():
+        message = ardupilotmega.MAVLink_message(message_id, kind.msgname)
+        v1 = message_id < 256 and rng.random() < 0.5
+        data += message._pack(mav, kind.crc_extra, rng.randbytes(kind.unpacker.size), force_mavlink1=v1)
+        mav.seq = (mav.seq + 1) % 256
+    frames, counters = feed(data)
+    assert [key(f) for f in frames] == pymavlink_frames(data)
+    assert counters.frames == len(ardupilotmega.mavlink_map)
+    assert not counters.bad_crc
+    assert not counters.unknown
+
+
+@pytest.mark.skipif(not RECORDINGS, reason="no recordings beside the checkout")
+@pytest.mark.parametrize("path", RECORDINGS[::12], ids=lambda p: p.stem)
+def test_pymavlink_reads_the_same_frames_of_a_recording(path: pathlib.Path) -> None:
+    log = path.read_bytes()[:300_000]
+    data, at = b"", 0
+    while at < len(log):  # a record is eight bytes of time and one frame
+        head = log[at + 8 : at + 11]
+        size = head[1] + (8 if head[0] == 0xFE else 25 if head[2] & 1 else 12) if len(head) == 3 else len(log)
+        data += log[at + 8 : at + 8 + size]
+        at += 8 + size
+    theirs = pymavlink_frames(data)
+    assert len(theirs) > 50
+    for source in (data, log):  # the second with the times as garbage between the frames
+        assert [key(f) for f in feed(source)[0] if f.message_id in ardupilotmega.mavlink_map] == theirs
+
+
+def missing(expected: list[tuple[Any, ...]], got: list[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+    """What does not occur in `got`, in order."""
+    rest = iter(got)
+    return [frame for frame in expected if frame not in rest]
+
+
+@given(st.lists(st.integers(0, sum(map(len, STREAM))), max_size=30))
+def test_any_cut_of_the_bytes_gives_the_same_frames(cuts: list[int]) -> None:
+    data = b"noise" + b"".join(STREAM)
+    edges = [0, *sorted(cuts), len(data)]
+    frames, counters = feed(*(data[a:b] for a, b in itertools.pairwise(edges)))
+    assert (frames, counters) == feed(data)
+    assert len(frames) == len(STREAM)
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_any_cut_of_damaged_bytes_gives_the_same_frames(seed: int) -> None:
+    data = damaged(random.Random(seed)) + heartbeat() * 2
+    whole, _ = feed(data)
+    for step in (1, 2, 7, 50):
+        assert feed(*(data[i : i + step] for i in range(0, len(data), step)))[0] == whole
+
+
+@given(st.lists(st.binary(max_size=40).map(lambda b: b.replace(b"\xfd", b"").replace(b"\xfe", b"")), min_size=61))
+def test_garbage_before_between_and_after_is_counted(garbage: list[bytes]) -> None:
+    data = garbage[0] + b"".join(frame + noise for frame, noise in zip(STREAM, garbage[1:], strict=False))
+    frames, counters = feed(data)
+    assert len(frames) == len(STREAM)
+    assert counters.garbage_bytes == sum(map(len, garbage[:61]))
+    assert counters.bad_crc == counters.unknown == {}
+
+
+@pytest.mark.parametrize("magic", [b"\xfd", b"\xfe"])
+def test_a_lone_magic_byte_delays_what_follows_but_loses_nothing(magic: bytes) -> None:
+    frames, _ = feed(STREAM[0] + magic, *STREAM[1:])
+    assert len(frames) == len(STREAM)
+
+
+def test_after_noise_a_header_that_claims_too_much_delays_no_good_frame() -> None:
+    pieces = b"noise\xfe\xff\0\0\0\0", heartbeat(1), heartbeat(2)
+    parser = Parser({0})
+    assert [[f.sequence for f in parser.feed(piece)] for piece in pieces] == [[], [1], [2]]
+
+
+def damaged(rng: random.Random) -> bytes:
+    """The stream with bytes flipped, missing and doubled; its end whole, so that nothing is left waiting."""
+    data = bytearray(b"".join(STREAM))
+    for _ in range(rng.randrange(1, 12)):
+        at = rng.randrange(len(data))
+        kind = rng.randrange(3)
+        if kind == 0:
+            data[at] = rng.randrange(256)
+        elif kind == 1:
+            del data[at : at + rng.randrange(1, 20)]
+        else:
+            data[at:at] = rng.randbytes(rng.randrange(1, 20))
+    return bytes(data) + b"".join(heartbeat(i) for i in range(20))
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_what_pymavlink_accepts_of_damaged_bytes_is_accepted(seed: int) -> None:
+    data = damaged(random.Random(seed))
+    ours = [key(f) for f in feed(data)[0]]
+    assert not missing(pymavlink_frames(data, pymavlink_dialect), ours)
+
+
+def test_a_wrong_length_byte_swallows_no_good_frames_where_pymavlink_loses_them() -> None:
+    broken = bytearray(heartbeat(0))
+    broken[1] = 200
+    data = bytes(broken) + b"".join(heartbeat(i) for i in range(1, 21))
+    frames, counters = feed(data)
+    assert [f.sequence for f in frames] == list(range(1, 21))
+    assert counters.bad_crc == {0: 1}
+    assert len(pymavlink_frames(data)) < 15
+
+
+@pytest.mark.parametrize("step", [1, 2, 3, 10_000])
+@pytest.mark.parametrize("length", [*range(60), 93, 100, 255])
+def test_no_length_byte_swallows_good_frames_however_they_are_read(length: int, step: int) -> None:
+    broken = bytearray(heartbeat(0))
+    broken[1] = length
+    data = bytes(broken) + b"".join(heartbeat(i) for i in range(1, 21))
+    frames, counters = feed(*(data[i : i + step] for i in range(0, len(data), step)))
+    assert [f.sequence for f in frames if f.sequence] == list(range(1, 21))
+    assert counters.bad_crc == ({} if length == 9 else {0: 1})
+
+
+def test_frames_of_another_definition_count_once_each_even_if_they_look_full_of_frames() -> None:
+    frame = bytearray(encode(Statustext(6, bytes([0xFE, 0xFD] * 25), 1, 1), system=1, component=1, sequence=0))
+    frame[-1] ^= 0x55
+    frames, counters = feed(*[bytes(frame)] * 100, heartbeat())
+    assert len(frames) == 1
+    assert counters.bad_crc == {253: 100}
+    assert counters.garbage_bytes == 0
+
+
+def test_unknown_ids_are_skipped_whole_and_counted() -> None:
+    hidden = heartbeat(9)
+    frames, counters = feed(unknown_frame(hidden, 0) + heartbeat(1), unknown_frame(b"end of the data", 2))
+    assert [f.sequence for f in frames] == [1]
+    assert counters == Counters(frames=1, unknown={UNKNOWN_ID: 2})
+
+
+def test_an_unknown_id_before_nothing_like_a_frame_is_searched() -> None:
+    frames, counters = feed(unknown_frame(b"12" + heartbeat(1) + b"34") + b"garbage" + heartbeat(2))
+    assert [f.sequence for f in frames] == [1, 2]
+    assert counters.unknown == {}
+
+
+def test_signed_frames_bring_their_signature_block() -> None:
+    mav = pymavlink_dialect.MAVLink(None, 5, 6)
+    mav.signing.secret_key = bytes(range(32))
+    mav.signing.sign_outgoing = True
+    mav.signing.link_id = 3
+    mav.signing.timestamp = 1234567890
+    packed = mav.heartbeat_encode(2, 3, 209, 4, 4).pack(mav)
+    (frame, following), counters = feed(packed + heartbeat())
+    assert frame.signature == packed[-13:]
+    assert frame.signature[0] == 3
+    assert frame.payload == following.payload
+    assert following.signature == b""
+    assert counters == Counters(frames=2, signed=1)
+
+
+def test_unknown_incompatibility_flags_are_counted_and_the_frame_is_not_delivered() -> None:
+    mav = pymavlink_dialect.MAVLink(None, 1, 1)
+    body = (
+        b"\x09\x02\x00\x00\x01\x01\x00\x00\x00" + HEARTBEAT.custom_mode.to_bytes(4, "little") + b"\x02\x03\xd1\x04\x03"
+    )
+    crc = pymavlink_dialect.x25crc(body + bytes([CRC_EXTRA[0]])).crc
+    assert mav.parse_buffer(heartbeat())  # the oracle agrees on the layout of the frame changed here
+    frames, counters = feed(b"\xfd" + body + crc.to_bytes(2, "little") + heartbeat(1))
+    assert [f.sequence for f in frames] == [1]
+    assert counters == Counters(frames=1, incompatible=1)
+
+
+@pytest.mark.parametrize(
+    ("sequences", "lost"),
+    [
+        ([0, 1, 2, 3], 0),
+        ([254, 255, 0, 1], 0),
+        ([5, 7, 10], 3),
+        ([250, 2], 7),
+        ([5, 5, 6, 6, 7], 0),
+        ([5, 7, 6, 8], 1),
+        ([200, 0, 1], 55),
+    ],
+)
+def test_lost_frames_are_counted_from_the_sequence(sequences: list[int], lost: int) -> None:
+    _, counters = feed(*(heartbeat(s) for s in sequences))
+    assert counters.lost == lost
+
+
+def test_each_source_has_a_sequence_of_its_own() -> None:
+    _, counters = feed(*(heartbeat(s, component=c) for s in range(5) for c in range(1, 4)))
+    assert counters.lost == 0
+
+
+def test_damaged_and_unknown_frames_are_not_lost_ones() -> None:
+    bad = bytearray(heartbeat(1))
+    bad[-1] ^= 1
+    _, counters = feed(heartbeat(0), bytes(bad), unknown_frame(sequence=2), heartbeat(3))
+    assert counters == Counters(frames=2, bad_crc={0: 1}, unknown={UNKNOWN_ID: 1})
+
+
+def test_the_number_of_sources_watched_is_bounded() -> None:
+    parser = Parser(())
+    for system in range(256):
+        for component in range(8):
+            parser.feed(heartbeat(0, system, component) + heartbeat(2, system, component))
+    assert parser.counters.frames == 4096
+    assert parser.counters.lost == MAX_SOURCES
+
+
+def test_the_number_of_ids_counted_is_bounded() -> None:
+    parser = Parser(())
+    for number in range(1000):
+        message_id = (900_000 + number).to_bytes(3, "little")
+        parser.feed(b"\xfd\x01\0\0\0\x01\x01" + message_id + b"\0\0\0")
+    assert len(parser.counters.unknown) == MAX_IDS + 1
+    assert parser.counters.unknown[OTHER_IDS] == 1000 - MAX_IDS
+
+
+def test_a_reset_drops_the_cut_frame() -> None:
+    parser = Parser({0})
+    parser.feed(heartbeat()[:10])
+    parser.reset()
+    assert [f.sequence for f in parser.feed(heartbeat(1))] == [1]
+    assert parser.counters.garbage_bytes == 10
+
+
+def test_a_reset_starts_in_step() -> None:
+    parser = Parser({0})
+    parser.feed(b"noise")
+    parser.reset()
+    parser.feed(unknown_frame() + heartbeat(1))
+    assert parser.counters.unknown == {UNKNOWN_ID: 1}
+
+
+def test_counters_add_up() -> None:
+    total = Counters(1, 2, 3, 4, 5, 6, {7: 8}, {9: 10})
+    total.add(Counters(10, 20, 30, 40, 50, 60, {7: 80, 8: 1}, {}))
+    assert total == Counters(11, 22, 33, 44, 55, 66, {7: 88, 8: 1}, {9: 10})
+
+
+hostile = st.lists(
+    st.one_of(
+        st.binary(max_size=300),
+        st.sampled_from([b"\xfd", b"\xfe", b"\xfd" * 300, b"\xfe" * 300, b"\xfd\xff\x01", b"\xfe\xff\0\0\0\0"]),
+        st.sampled_from(STREAM).flatmap(lambda f: st.integers(0, len(f)).map(lambda n: f[:n])),
+    ),
+    max_size=20,
+)
+
+
+@settings(max_examples=300)
+@given(hostile)
+def test_whatever_comes_nothing_raises_and_little_is_kept(pieces: list[bytes]) -> None:
+    parser = Parser(CRC_EXTRA)
+    for piece in pieces:
+        parser.feed(piece)
+        assert len(parser._tail) <= MAX_FRAME
+
+
+@given(hostile)
+def test_after_any_noise_frames_come_through_again(pieces: list[bytes]) -> None:
+    parser = Parser({0})
+    for piece in pieces:
+        parser.feed(piece)
+    # the noise may end in a header that claims one frame's length at most, or in one whole skipped frame
+    frames = [f for i in range(30) for f in parser.feed(heartbeat(i))]
+    assert [f.sequence for f in frames][-1] == 29

@@ -301,11 +301,21 @@ def in_motion(view: View) -> Finding:
     elif aircraft and landed_state == ON_GROUND:
         value = FALSE
         why = Evidence("on the ground, no speed known", "EXTENDED_SYS_STATE.landed_state", landed_at)
+    elif memory.observation.gps is not None and _gps_stands_still(view):
+        value = FALSE
+        why = Evidence("no estimate, but the GPS receiver stands still", "GPS_RAW_INT.vel", memory.observation.gps.at)
     else:
         return UNKNOWN, Evidence("no fresh speed")
     if value is FALSE and view.armed and aircraft and landed_state == UNDEFINED and not _on_ground(view):
         return UNKNOWN, Evidence("armed, and nothing tells whether it is airborne", source, at)
     return value, why
+
+
+def _gps_stands_still(view: View) -> bool:
+    """True if the receiver's own speed says rest. It is believed for nothing else: at rest it may read several m/s."""
+    memory = view.memory
+    fresh = is_fresh(memory.observation.gps, view.now, motion.FRESH)
+    return fresh and motion.settle(memory.gps_motion, view.now).value is FALSE
 
 
 def _on_ground(view: View) -> bool:

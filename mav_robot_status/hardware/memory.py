@@ -9,10 +9,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import Instant
-from . import causes, estop, motion, outputs, sensors, statustext
+from . import causes, estop, outputs, sensors, statustext
 from .boot import Boot
 from .flight_mode import AvailableMode
 from .identity import Family, Stack, family_of, stack_of
+from .motion import UNKNOWN as STILL_UNKNOWN
+from .motion import Motion
 from .observation import Heard, Observation, heard
 from .pulse import Pulse, first_beat
 
@@ -43,7 +45,9 @@ class Memory(NamedTuple):
     faults: sensors.Faults = sensors.NO_FAULTS
     latches: causes.Latches = causes.NO_LATCHES
     stop: estop.Stop = estop.NOTHING
-    motion: motion.Motion = motion.UNKNOWN
+    motion: Motion = STILL_UNKNOWN
+    gps_motion: Motion = STILL_UNKNOWN
+    """What the receiver's own ground speed says; only used while the autopilot has no estimate."""
     watch: outputs.Watch = outputs.NOT_WATCHED
     texts: statustext.Assembly = statustext.EMPTY
     modes: Mapping[int, AvailableMode] = NO_MODES

@@ -55,6 +55,8 @@ class Observation(NamedTuple):
     global_position: Heard | None = None
     local_position: Heard | None = None
     vfr_hud: Heard | None = None
+    gps: Heard | None = None
+    """GPS_RAW_INT with a fix and a speed."""
     attitude: Heard | None = None
     current_mode: Heard | None = None
     esc: Heard | None = None

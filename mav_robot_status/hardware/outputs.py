@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 OFF_STOP: Final = 20  # us: further from the stop value than this is driven
 AT_STOP: Final = 5  # us: as near as this is held
 LEAST_PULSE: Final = 800  # us: an output of less is switched off, and teaches nothing
+SEVERAL: Final = 3  # motors that all leave their stop value when armed: nothing but a multirotor does that
 DEMAND: Final = 15  # %: VFR_HUD.throttle from which an output at stop is suspicious
 HOLD: Final = 1.0  # s
 BEATS_APART: Final = 3.5  # s: a stop value counts only from between two disarmed heartbeats this near
@@ -54,7 +55,8 @@ class Watch(NamedTuple):
     candidate: Outputs = ()
     """Outputs while disarmed that wait for the next heartbeat to confirm the disarm."""
     proved: bool = False
-    """Whether, since boot, a motor channel has left its stop value while throttle was demanded."""
+    """Whether, since boot, the channels have shown that they are motors: off stop while throttle was demanded, or all
+    off stop at once."""
     driven_seen: bool = False
     """Whether a motor was driven since the last arming."""
     driven: bool = False
@@ -87,7 +89,8 @@ def heard_outputs(
     off_stop = any(abs(value - stop) > OFF_STOP for value, stop in known)
     at_stop = len(known) == len(motors) > 0 and all(abs(value - stop) <= AT_STOP for value, stop in known)
     demanded = throttle is not None and throttle >= DEMAND
-    proved = watch.proved or (off_stop and demanded)
+    all_off = len(known) == len(motors) >= SEVERAL and all(abs(value - stop) > OFF_STOP for value, stop in known)
+    proved = watch.proved or (off_stop and demanded) or all_off
     driven = off_stop and (proved or not assumed)
     held_since, speed_then = watch.held_since, watch.speed_then
     if not (at_stop and demanded and proved and watch.driven_seen):

@@ -73,6 +73,27 @@ class ParamValue(NamedTuple):
     param_type: int
 
 
+class GpsRawInt(NamedTuple):
+    """GPS_RAW_INT, id 24; fields in wire order, arrays as raw bytes."""
+
+    time_usec: int
+    lat: int
+    lon: int
+    alt: int
+    eph: int
+    epv: int
+    vel: int
+    cog: int
+    fix_type: int
+    satellites_visible: int
+    alt_ellipsoid: int
+    h_acc: int
+    v_acc: int
+    vel_acc: int
+    hdg_acc: int
+    yaw: int
+
+
 class Attitude(NamedTuple):
     """ATTITUDE, id 30; fields in wire order, arrays as raw bytes."""
 
@@ -343,6 +364,7 @@ MESSAGES: Final[dict[int, Definition]] = {
     11: Definition(11, "SET_MODE", Struct("<IBB"), SetMode),
     20: Definition(20, "PARAM_REQUEST_READ", Struct("<hBB16s"), ParamRequestRead),
     22: Definition(22, "PARAM_VALUE", Struct("<fHH16sB"), ParamValue),
+    24: Definition(24, "GPS_RAW_INT", Struct("<QiiiHHHHBBiIIIIH"), GpsRawInt),
     30: Definition(30, "ATTITUDE", Struct("<Iffffff"), Attitude),
     32: Definition(32, "LOCAL_POSITION_NED", Struct("<Iffffff"), LocalPositionNed),
     33: Definition(33, "GLOBAL_POSITION_INT", Struct("<IiiiihhhH"), GlobalPositionInt),

@@ -367,6 +367,7 @@ MAVLINK_MSG_ID_SYSTEM_TIME = 2
 MAVLINK_MSG_ID_SET_MODE = 11
 MAVLINK_MSG_ID_PARAM_REQUEST_READ = 20
 MAVLINK_MSG_ID_PARAM_VALUE = 22
+MAVLINK_MSG_ID_GPS_RAW_INT = 24
 MAVLINK_MSG_ID_ATTITUDE = 30
 MAVLINK_MSG_ID_LOCAL_POSITION_NED = 32
 MAVLINK_MSG_ID_GLOBAL_POSITION_INT = 33
@@ -677,6 +678,62 @@ class MAVLink_param_value_message(MAVLink_message):
 # Define name on the class for backwards compatibility (it is now msgname).
 # Done with setattr to hide the class variable from mypy.
 setattr(MAVLink_param_value_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_gps_raw_int_message(MAVLink_message):
+    """
+    The global position, as returned by the Global Positioning System
+    (GPS). This is                 NOT the global position estimate of
+    the system, but rather a RAW sensor value. See message
+    GLOBAL_POSITION_INT for the global position estimate.
+    """
+
+    id = MAVLINK_MSG_ID_GPS_RAW_INT
+    msgname = "GPS_RAW_INT"
+    fieldnames = ["time_usec", "fix_type", "lat", "lon", "alt", "eph", "epv", "vel", "cog", "satellites_visible", "alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "hdg_acc", "yaw"]
+    ordered_fieldnames = ["time_usec", "lat", "lon", "alt", "eph", "epv", "vel", "cog", "fix_type", "satellites_visible", "alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "hdg_acc", "yaw"]
+    fieldtypes = ["uint64_t", "uint8_t", "int32_t", "int32_t", "int32_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "int32_t", "uint32_t", "uint32_t", "uint32_t", "uint32_t", "uint16_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "lat": "degE7", "lon": "degE7", "alt": "mm", "vel": "cm/s", "cog": "cdeg", "alt_ellipsoid": "mm", "h_acc": "mm", "v_acc": "mm", "vel_acc": "mm/s", "hdg_acc": "degE5", "yaw": "cdeg"}
+    native_format = bytearray(b"<QiiiHHHHBBiIIIIH")
+    orders = [0, 8, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, 13, 14, 15]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 24
+    unpacker = struct.Struct("<QiiiHHHHBBiIIIIH")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, time_usec: int, fix_type: int, lat: int, lon: int, alt: int, eph: int, epv: int, vel: int, cog: int, satellites_visible: int, alt_ellipsoid: int = 0, h_acc: int = 0, v_acc: int = 0, vel_acc: int = 0, hdg_acc: int = 0, yaw: int = 0):
+        MAVLink_message.__init__(self, MAVLink_gps_raw_int_message.id, MAVLink_gps_raw_int_message.msgname)
+        self._fieldnames = MAVLink_gps_raw_int_message.fieldnames
+        self._instance_field = MAVLink_gps_raw_int_message.instance_field
+        self._instance_offset = MAVLink_gps_raw_int_message.instance_offset
+        self.time_usec = time_usec
+        self.fix_type = fix_type
+        self.lat = lat
+        self.lon = lon
+        self.alt = alt
+        self.eph = eph
+        self.epv = epv
+        self.vel = vel
+        self.cog = cog
+        self.satellites_visible = satellites_visible
+        self.alt_ellipsoid = alt_ellipsoid
+        self.h_acc = h_acc
+        self.v_acc = v_acc
+        self.vel_acc = vel_acc
+        self.hdg_acc = hdg_acc
+        self.yaw = yaw
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.lat, self.lon, self.alt, self.eph, self.epv, self.vel, self.cog, self.fix_type, self.satellites_visible, self.alt_ellipsoid, self.h_acc, self.v_acc, self.vel_acc, self.hdg_acc, self.yaw), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_gps_raw_int_message, "name", mavlink_msg_deprecated_name_property())
 
 
 class MAVLink_attitude_message(MAVLink_message):
@@ -1695,6 +1752,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_SET_MODE: MAVLink_set_mode_message,
     MAVLINK_MSG_ID_PARAM_REQUEST_READ: MAVLink_param_request_read_message,
     MAVLINK_MSG_ID_PARAM_VALUE: MAVLink_param_value_message,
+    MAVLINK_MSG_ID_GPS_RAW_INT: MAVLink_gps_raw_int_message,
     MAVLINK_MSG_ID_ATTITUDE: MAVLink_attitude_message,
     MAVLINK_MSG_ID_LOCAL_POSITION_NED: MAVLink_local_position_ned_message,
     MAVLINK_MSG_ID_GLOBAL_POSITION_INT: MAVLink_global_position_int_message,
@@ -2340,6 +2398,60 @@ class MAVLink(object):
 
         """
         self.send(self.param_value_encode(param_id, param_value, param_type, param_count, param_index), force_mavlink1=force_mavlink1)
+
+    def gps_raw_int_encode(self, time_usec: int, fix_type: int, lat: int, lon: int, alt: int, eph: int, epv: int, vel: int, cog: int, satellites_visible: int, alt_ellipsoid: int = 0, h_acc: int = 0, v_acc: int = 0, vel_acc: int = 0, hdg_acc: int = 0, yaw: int = 0) -> MAVLink_gps_raw_int_message:
+        """
+        The global position, as returned by the Global Positioning System
+        (GPS). This is                 NOT the global position
+        estimate of the system, but rather a RAW sensor value. See
+        message GLOBAL_POSITION_INT for the global position estimate.
+
+        time_usec                 : Timestamp (UNIX Epoch time or time since system boot). The receiving end can infer timestamp format (since 1.1.1970 or since system boot) by checking for the magnitude of the number. [us] (type:uint64_t)
+        fix_type                  : GPS fix type. (type:uint8_t)
+        lat                       : Latitude (WGS84, EGM96 ellipsoid) [degE7] (type:int32_t)
+        lon                       : Longitude (WGS84, EGM96 ellipsoid) [degE7] (type:int32_t)
+        alt                       : Altitude (MSL). Positive for up. Note that virtually all GPS modules provide the MSL altitude in addition to the WGS84 altitude. [mm] (type:int32_t)
+        eph                       : GPS HDOP horizontal dilution of position (unitless * 100). If unknown, set to: UINT16_MAX (type:uint16_t)
+        epv                       : GPS VDOP vertical dilution of position (unitless * 100). If unknown, set to: UINT16_MAX (type:uint16_t)
+        vel                       : GPS ground speed. If unknown, set to: UINT16_MAX [cm/s] (type:uint16_t)
+        cog                       : Course over ground (NOT heading, but direction of movement) in degrees * 100, 0.0..359.99 degrees. If unknown, set to: UINT16_MAX [cdeg] (type:uint16_t)
+        satellites_visible        : Number of satellites visible. If unknown, set to UINT8_MAX (type:uint8_t)
+        alt_ellipsoid             : Altitude (above WGS84, EGM96 ellipsoid). Positive for up. [mm] (type:int32_t)
+        h_acc                     : Position uncertainty. [mm] (type:uint32_t)
+        v_acc                     : Altitude uncertainty. [mm] (type:uint32_t)
+        vel_acc                   : Speed uncertainty. [mm/s] (type:uint32_t)
+        hdg_acc                   : Heading / track uncertainty [degE5] (type:uint32_t)
+        yaw                       : Yaw in earth frame from north. Use 0 if this GPS does not provide yaw. Use UINT16_MAX if this GPS is configured to provide yaw and is currently unable to provide it. Use 36000 for north. [cdeg] (type:uint16_t)
+
+        """
+        return MAVLink_gps_raw_int_message(time_usec, fix_type, lat, lon, alt, eph, epv, vel, cog, satellites_visible, alt_ellipsoid, h_acc, v_acc, vel_acc, hdg_acc, yaw)
+
+    def gps_raw_int_send(self, time_usec: int, fix_type: int, lat: int, lon: int, alt: int, eph: int, epv: int, vel: int, cog: int, satellites_visible: int, alt_ellipsoid: int = 0, h_acc: int = 0, v_acc: int = 0, vel_acc: int = 0, hdg_acc: int = 0, yaw: int = 0, force_mavlink1: bool = False) -> None:
+        """
+        The global position, as returned by the Global Positioning System
+        (GPS). This is                 NOT the global position
+        estimate of the system, but rather a RAW sensor value. See
+        message GLOBAL_POSITION_INT for the global position estimate.
+
+        time_usec                 : Timestamp (UNIX Epoch time or time since system boot). The receiving end can infer timestamp format (since 1.1.1970 or since system boot) by checking for the magnitude of the number. [us] (type:uint64_t)
+        fix_type                  : GPS fix type. (type:uint8_t)
+        lat                       : Latitude (WGS84, EGM96 ellipsoid) [degE7] (type:int32_t)
+        lon                       : Longitude (WGS84, EGM96 ellipsoid) [degE7] (type:int32_t)
+        alt                       : Altitude (MSL). Positive for up. Note that virtually all GPS modules provide the MSL altitude in addition to the WGS84 altitude. [mm] (type:int32_t)
+        eph                       : GPS HDOP horizontal dilution of position (unitless * 100). If unknown, set to: UINT16_MAX (type:uint16_t)
+        epv                       : GPS VDOP vertical dilution of position (unitless * 100). If unknown, set to: UINT16_MAX (type:uint16_t)
+        vel                       : GPS ground speed. If unknown, set to: UINT16_MAX [cm/s] (type:uint16_t)
+        cog                       : Course over ground (NOT heading, but direction of movement) in degrees * 100, 0.0..359.99 degrees. If unknown, set to: UINT16_MAX [cdeg] (type:uint16_t)
+        satellites_visible        : Number of satellites visible. If unknown, set to UINT8_MAX (type:uint8_t)
+        alt_ellipsoid             : Altitude (above WGS84, EGM96 ellipsoid). Positive for up. [mm] (type:int32_t)
+        h_acc                     : Position uncertainty. [mm] (type:uint32_t)
+        v_acc                     : Altitude uncertainty. [mm] (type:uint32_t)
+        vel_acc                   : Speed uncertainty. [mm/s] (type:uint32_t)
+        hdg_acc                   : Heading / track uncertainty [degE5] (type:uint32_t)
+        yaw                       : Yaw in earth frame from north. Use 0 if this GPS does not provide yaw. Use UINT16_MAX if this GPS is configured to provide yaw and is currently unable to provide it. Use 36000 for north. [cdeg] (type:uint16_t)
+
+        """
+        self.send(self.gps_raw_int_encode(time_usec, fix_type, lat, lon, alt, eph, epv, vel, cog, satellites_visible, alt_ellipsoid, h_acc, v_acc, vel_acc, hdg_acc, yaw), force_mavlink1=force_mavlink1)
 
     def attitude_encode(self, time_boot_ms: int, roll: float, pitch: float, yaw: float, rollspeed: float, pitchspeed: float, yawspeed: float) -> MAVLink_attitude_message:
         """

@@ -27,6 +27,7 @@ HANDLERS: Final[dict[type, Handler]] = {
     mav.GlobalPositionInt: movement.global_position,
     mav.LocalPositionNed: movement.local_position,
     mav.VfrHud: movement.vfr_hud,
+    mav.GpsRawInt: movement.gps_raw_int,
     mav.Attitude: movement.attitude,
     mav.SystemTime: movement.system_time,
     mav.ServoOutputRaw: movement.servo_output_raw,

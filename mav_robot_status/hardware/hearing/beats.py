@@ -43,9 +43,11 @@ def heartbeat(memory: Memory, message: Heartbeat, now: Instant, options: Hardwar
     if _starts_anew(previous, message, memory):
         memory = rebooted(memory, boot_rules.Boot(now.mono), now)
     if now.mono - last > LONG_LOSS:
-        memory = memory._replace(latches={}, stop=estop.NOTHING, not_ready=None, failsafe=None)
+        memory = memory._replace(latches=causes.NO_LATCHES, stop=estop.NOTHING, not_ready=None, failsafe=None)
     if not connected:
-        memory = memory._replace(stop=memory.stop._replace(ready=0), motion=motion.UNKNOWN, assumed_free=False)
+        memory = memory._replace(
+            stop=memory.stop._replace(ready=0), motion=motion.UNKNOWN, gps_motion=motion.UNKNOWN, assumed_free=False
+        )
     if pulse.armed and not before.armed:
         memory = _armed(memory, last, now)
     elif before.armed and not pulse.armed:
@@ -81,6 +83,7 @@ def rebooted(memory: Memory, boot: boot_rules.Boot, now: Instant) -> Memory:
         latches=latches,
         stop=estop.NOTHING,
         motion=motion.UNKNOWN,
+        gps_motion=motion.UNKNOWN,
         watch=outputs.Watch(functions=memory.watch.functions),
         texts=statustext.EMPTY,
         not_ready=None,

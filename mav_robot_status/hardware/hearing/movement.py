@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from struct import unpack
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from ...interface.status import TriState
 from ...mavlink import definitions as mav
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from ...clock import Instant
     from ..memory import Memory
     from ..options import HardwareOptions
+
+
+FIX_3D: Final = 3  # GPS_FIX_TYPE
+NO_SPEED: Final = 0xFFFF  # GPS_RAW_INT.vel
 
 
 def extended_sys_state(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
@@ -53,6 +57,16 @@ def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: Hardware
         return memory
     climb = 0.0 if message.groundspeed == 0 else message.climb  # a ground speed of exactly 0 alone is no estimate
     return _moved(memory, _speed(memory, message.groundspeed, 0.0, climb, False), now, options)
+
+
+def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> Memory:
+    """GPS_RAW_INT: whether the receiver itself stands still."""
+    if message.fix_type < FIX_3D or message.vel == NO_SPEED:
+        return memory._replace(gps_motion=motion.UNKNOWN)
+    memory = observed(memory, gps=heard(message, now.mono, memory.observation.gps))
+    rate = rotation(memory, now.mono)
+    moved = motion.moved(memory.gps_motion, message.vel / 100, rate, memory.pulse.armed, options, now.mono)
+    return memory._replace(gps_motion=moved)
 
 
 def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> Memory:

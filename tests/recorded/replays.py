@@ -1,0 +1,106 @@
+"""Replaying a log as the command does, and judging its lines against ground truth."""
+
+from __future__ import annotations
+
+import bisect
+import json
+import pathlib
+import tempfile
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any, NamedTuple
+
+from mav_robot_status.config import Config, ControllerConfig, PublisherConfig
+from mav_robot_status.gateway.plant import DEFAULT_CONTROLLER
+from mav_robot_status.gateway.replay import replay
+from mav_robot_status.hardware.options import HardwareOptions
+
+HERE = pathlib.Path(__file__).parent
+OURS = HERE / "logs"
+SHARED = HERE.parents[2] / "shared" / "recordings"
+OLDEST = 2.0  # s: an older line says nothing about a moment
+FIELDS = ("mode", "e_stopped", "drives_powered", "motion_possible", "in_motion", "in_error")
+
+
+def lines_of(log: pathlib.Path, options: HardwareOptions | None = None) -> list[str]:
+    """The JSON lines of a log, at 10 Hz and on change."""
+    controller = ControllerConfig(
+        DEFAULT_CONTROLLER.name,
+        DEFAULT_CONTROLLER.type,
+        {"publish_rate": 10},
+        DEFAULT_CONTROLLER.where,
+        (PublisherConfig("json"),),
+    )
+    config = Config(hardware=options or HardwareOptions(), controllers=(controller,))
+    with tempfile.TemporaryFile("w+") as out:
+        replay(config, str(log), out)
+        out.seek(0)
+        return out.readlines()
+
+
+def broken_invariants(line: dict[str, Any]) -> Iterator[str]:
+    """The names of the invariants I1 to I4 that a line breaks, and of what the line promises beside them."""
+    if line["e_stopped"] is True and line["drives_powered"] is not False:
+        yield "I1"
+    if line["drives_powered"] is False and line["motion_possible"] is not False:
+        yield "I2"
+    if (line["error_code"] != 0) != (line["in_error"] is True):
+        yield "I3"
+    if line["link"]["state"] != "CONNECTED" and (
+        line["mode"] != "UNKNOWN" or line["error_code"] or any(line[f] is not None for f in FIELDS[1:])
+    ):
+        yield "I4"
+    if (line["motion_possible"] is True) != (line["inhibits"] == []):
+        yield "inhibits are empty exactly while motion is possible"
+    if [e["code"] for e in line["errors"]][:1] != ([line["error_code"]] if line["error_code"] else []):
+        yield "error_code is the first of errors"
+
+
+class Judgement(NamedTuple):
+    """One checkpoint: right, honest (unknown where that is accepted), unknown, WRONG or missing."""
+
+    verdict: str
+    field: str
+    got: object
+    point: dict[str, Any]
+
+
+def judged(truth_file: pathlib.Path, log: pathlib.Path, options: HardwareOptions | None = None) -> list[Judgement]:
+    """Every checkpoint of a truth file against the lines of its log."""
+    truth = json.loads(truth_file.read_text(encoding="utf-8"))
+    stamps, rows = [], []
+    for line in lines_of(log, options):
+        row = json.loads(line)
+        if (row["system"], row["component"]) == (truth["system"], truth["component"]):
+            stamps.append(datetime.fromisoformat(row["stamp"].replace("Z", "+00:00")).timestamp())
+            rows.append(row)
+    out = []
+    for point in truth["checkpoints"]:
+        i = bisect.bisect_right(stamps, point["t"] + 5e-7) - 1
+        if i < 0 or point["t"] - stamps[i] > OLDEST:
+            out.append(Judgement("missing", point["field"], None, point))
+            continue
+        field = point["field"]
+        got = rows[i]["link"]["state"] if field == "link" else rows[i][field]
+        verdict = _verdict(got, point["expect"], point["acceptable"])
+        out.append(Judgement(verdict, field, got, point))
+        if field == "in_error" and verdict == "right":
+            out.append(_judged_code(rows[i]["error_code"], point))
+    return out
+
+
+def _verdict(got: object, expect: object, acceptable: list[object]) -> str:
+    unknown = (None, "UNKNOWN")
+    if got == expect or (got in unknown and expect in unknown):
+        return "right"
+    if got in unknown:
+        return "honest" if any(a in unknown for a in acceptable) else "unknown"
+    return "right" if got in acceptable else "WRONG"
+
+
+def _judged_code(code: int, point: dict[str, Any]) -> Judgement:
+    wanted = point.get("code_in") if point["expect"] else [0]
+    if wanted is None or code in wanted:
+        return Judgement("right", "error_code", code, point)
+    verdict = "honest" if code in point.get("code_vague", ()) else "WRONG"
+    return Judgement(verdict, "error_code", code, point)

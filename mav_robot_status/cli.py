@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import logging
+import signal
 import sys
+import threading
 from typing import TYPE_CHECKING, Final
 
 from . import __version__
 from .config import Config, ControllerConfig, LinkConfig, PublisherConfig, VehicleConfig, describe
 from .config import load as load_config
 from .errors import MavRobotStatusError, UsageError
+from .interface import DEFAULT_HANDLE_NAME
 from .link.url import help_text, parse
+from .streams import StderrHandler, complain, detach, open_missing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,23 +28,31 @@ FORMATS: Final = ("native", "ros1", "ros2")
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command. 0 done; 1 a link or output failed for good; 2 usage, configuration, missing log file."""
+    open_missing()
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] not in (*COMMANDS, "-h", "--help", "--version"):
         arguments.insert(0, "run")
-    options = _parser().parse_args(arguments)
     try:
-        command: Callable[[argparse.Namespace], int] = COMMANDS[options.command]
-        return command(options)
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, signal.default_int_handler)  # until the gateway has a handler of its own
+        return _run(arguments)
     except MavRobotStatusError as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)  # noqa: T201
+        complain(f"{PROGRAM}: {error}")
         return error.exit_code
     except BrokenPipeError:
-        from .publishers.json_lines import stdout_is_closed
-
-        stdout_is_closed()
+        detach(sys.stdout)
         return 0
     except KeyboardInterrupt:
         return 0
+
+
+def _run(arguments: list[str]) -> int:
+    try:
+        options = _parser().parse_args(arguments)
+        command: Callable[[argparse.Namespace], int] = COMMANDS[options.command]
+        return command(options)
+    finally:
+        sys.stdout.flush()  # here, where a reader that has gone can be dealt with
 
 
 def run(options: argparse.Namespace) -> int:
@@ -108,17 +121,23 @@ def overridden(config: Config, options: argparse.Namespace) -> Config:
         links = tuple(dataclasses.replace(link, passive=True) for link in links)
     if options.baud is not None:
         links = tuple(dataclasses.replace(link, url=_with_baud(link.url, options.baud)) for link in links)
-    changes: dict[str, object] = {"links": links}
-    if options.out:
-        changes["outs"] = tuple(LinkConfig(url) for url in options.out)
+    outs = tuple(LinkConfig(url) for url in options.out) if options.out else config.outs
+    for out in outs:
+        if parse(out.url).kind == "log":
+            raise UsageError(f"{out.url!r} is a log, and an out is sent to: write one like udpout:192.168.1.20:14550")
     if options.system is not None:
-        changes["vehicles"] = tuple(v for v in config.vehicles if v.system == options.system) or (
-            VehicleConfig(system=options.system),
-        )
-    changes["controllers"] = _controllers(config, options)
-    for link in (*links, *changes.get("outs", config.outs)):  # type: ignore[misc]
-        parse(link.url)
-    return dataclasses.replace(config, **changes)  # type: ignore[arg-type]
+        config = _only(config, options.system)
+    return dataclasses.replace(config, links=links, outs=outs, controllers=_controllers(config, options))
+
+
+def _only(config: Config, system: int) -> Config:
+    """The configuration for one vehicle; the controllers of the others are left out."""
+    vehicles = tuple(v for v in config.vehicles if v.system == system) or (VehicleConfig(system=system),)
+    others = {v.handle for v in config.vehicles} - {v.handle for v in vehicles}
+    controllers = tuple(
+        c for c in config.controllers if c.parameters.get("handle_name", DEFAULT_HANDLE_NAME) not in others
+    )
+    return dataclasses.replace(config, vehicles=vehicles, controllers=controllers)
 
 
 def _controllers(config: Config, options: argparse.Namespace) -> tuple[ControllerConfig, ...]:
@@ -149,6 +168,9 @@ def _controllers(config: Config, options: argparse.Namespace) -> tuple[Controlle
                 ),
             )
         )
+    if options.json not in (None, "none") and not any(p.type == "json" for c in changed for p in c.publishers or ()):
+        asked = PublisherConfig("json", json_options)
+        return tuple(dataclasses.replace(c, publishers=(asked, *(c.publishers or ()))) for c in changed)
     return tuple(changed)
 
 
@@ -181,7 +203,7 @@ def _parser() -> argparse.ArgumentParser:
     runs.add_argument("--json", metavar="FILE|-|none", help="where the JSON lines go (-: standard output)")
     runs.add_argument("--format", choices=FORMATS, help="form of the JSON lines (native)")
     runs.add_argument("--system", type=_system, metavar="N", help="only the vehicle with this system id")
-    runs.add_argument("--baud", type=int, metavar="N", help="baud rate of serial connections (57600)")
+    runs.add_argument("--baud", type=_baud, metavar="N", help="baud rate of serial connections (57600)")
     runs.add_argument("--passive", action="store_true", help="never send anything on the vehicle links")
     _verbosity(runs)
 
@@ -204,22 +226,30 @@ def _verbosity(parser: argparse.ArgumentParser) -> None:
 
 
 def _rate(text: str) -> float:
-    rate = float(text)
-    if not abs(rate) <= 1000:
-        raise argparse.ArgumentTypeError(f"{text} is not a rate; write a number of Hz up to 1000, 0 for none")
-    return rate
+    with contextlib.suppress(ValueError):
+        if abs(rate := float(text)) <= 1000:
+            return rate
+    raise argparse.ArgumentTypeError(f"{text!r} is not a rate; write a number of Hz up to 1000, 0 for none")
 
 
 def _system(text: str) -> int:
-    number = int(text)
-    if not 1 <= number <= 255:
-        raise argparse.ArgumentTypeError(f"{text} is not a system id; write a number from 1 to 255")
-    return number
+    return _number(text, "a system id", 255)
+
+
+def _baud(text: str) -> int:
+    return _number(text, "a baud rate", 99_999_999)
+
+
+def _number(text: str, what: str, most: int) -> int:
+    with contextlib.suppress(ValueError):
+        if 1 <= (number := int(text)) <= most:
+            return number
+    raise argparse.ArgumentTypeError(f"{text!r} is not {what}; write a number from 1 to {most}")
 
 
 def _log_to_stderr(options: argparse.Namespace) -> None:
     level = logging.DEBUG if options.verbose else logging.WARNING if options.quiet else logging.INFO
-    logging.basicConfig(level=level, stream=sys.stderr, format=f"{PROGRAM}: %(message)s")
+    logging.basicConfig(level=level, handlers=[StderrHandler(sys.stderr)], format=f"{PROGRAM}: %(message)s")
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ RETRY: Final = 0.02  # s until a busy publisher is asked again
 class _Output:
     """One publisher and what it was given."""
 
-    __slots__ = ("changes", "last", "publisher", "sent", "skipped")
+    __slots__ = ("changes", "last", "publisher", "sent", "skipped", "waiting")
 
     def __init__(self, publisher: Publisher, start: float) -> None:
         self.publisher = publisher
@@ -43,8 +43,9 @@ class _Output:
         """The time of the last periodic message: it keeps the phase."""
         self.sent: tuple[RobotStatus, Detail] | None = None
         self.changes: deque[float] = deque(maxlen=MOST_CHANGES)
+        self.waiting = False
         self.skipped = 0
-        """Messages that were due and not taken because the publisher was busy."""
+        """How often the publisher was busy when a message was due."""
 
 
 class IndustrialRobotStatusController:
@@ -100,8 +101,10 @@ class IndustrialRobotStatusController:
                 continue
             if output.publisher.busy():
                 # ORIGINAL: skips a busy publisher too, but does not count it.
-                output.skipped += 1
+                output.skipped += not output.waiting
+                output.waiting = True
                 continue
+            output.waiting = False
             if due:
                 self._keep_phase(output, now)
             else:
@@ -116,7 +119,7 @@ class IndustrialRobotStatusController:
         """End publishing. What was skipped is told in the log."""
         skipped = sum(output.skipped for output in self._outputs)
         if skipped:
-            log.warning("%s: %d messages were skipped because an output was busy", self.handle.name, skipped)
+            log.warning("%s: an output was busy %d times, and messages were skipped", self.handle.name, skipped)
         self._outputs = []
 
     def next_due(self, now: float) -> float:
@@ -142,7 +145,7 @@ class IndustrialRobotStatusController:
         output.last += period
         # ORIGINAL: goes on by one period only, so a stall is followed by a burst of all the messages missed.
         if output.last + period < now:
-            output.last += math.floor((now - output.last) / period) * period
+            output.last = now - math.fmod(now - output.last, period)
 
     def _may_change(self, output: _Output, now: float) -> bool:
         changes = output.changes

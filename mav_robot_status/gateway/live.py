@@ -7,90 +7,28 @@ import math
 import select
 import signal
 import socket
-import time
-from collections import OrderedDict
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
-from ..hardware.robot_hw import WANTED_IDS
 from ..interface import TriState
-from ..link import open_link
-from ..link.url import parse
 from ..mavlink.component import LONELY_SYSTEM, Component
-from ..mavlink.framing import Counters, Parser
 from .plant import Plant
+from .station import Station
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import TextIO
 
     from ..clock import Instant
-    from ..config import Config, LinkConfig
-    from ..link.base import Address, Link
+    from ..config import Config
+    from ..link.base import Address
 
 log = logging.getLogger(__name__)
 
-MOST_SOURCES: Final = 64
-"""Addresses on one link whose cut frames are put together; the longest silent is let go."""
-MOST_PEERS: Final = 8
-PEER_SILENCE: Final = 30.0  # s
 HEARTBEAT_PERIOD: Final = 1.0  # s
 FIRST_SILENCE, LATER_SILENCE = 3.5, 30.0  # s until the log says that no autopilot is heard, and again
-SPEAKS_FIRST: Final = frozenset({"udpout", "udpbcast", "tcp"})
-
-
-class Station:
-    """One link with what was heard on it."""
-
-    def __init__(self, config: LinkConfig, is_out: bool) -> None:
-        url = parse(config.url)
-        self.link: Link = open_link(url)
-        self.passive = config.passive
-        self.is_out = is_out
-        self.listens = url.kind not in SPEAKS_FIRST
-        self.peers: OrderedDict[Address, float] = OrderedDict()
-        """Addresses of autopilots and when they were last heard."""
-        self.counters = Counters()
-        self._parsers: OrderedDict[Address, Parser] = OrderedDict()
-
-    def parser(self, source: Address) -> Parser:
-        """The parser of what one address sends."""
-        parser = self._parsers.get(source)
-        if parser is None:
-            if len(self._parsers) >= MOST_SOURCES:
-                self.counters.add(self._parsers.popitem(last=False)[1].counters)
-            parser = self._parsers[source] = Parser(WANTED_IDS)
-        elif len(self._parsers) > 1:
-            self._parsers.move_to_end(source)
-        return parser
-
-    def heard_autopilot(self, source: Address, now: float) -> None:
-        """An address that sends an autopilot's heartbeat is a peer, unless there are enough."""
-        if source in self.peers or len(self.peers) < MOST_PEERS:
-            self.peers[source] = now
-
-    def forget_silent(self, now: float) -> None:
-        """Peers that have been silent for long are none any more."""
-        for source in [s for s, at in self.peers.items() if now - at > PEER_SILENCE]:
-            del self.peers[source]
-
-    def send(self, frame: bytes) -> None:
-        """Send to everyone here who listens."""
-        if self.passive:
-            return
-        if not self.listens:
-            self.link.send(frame)
-            return
-        for source in self.peers:
-            self.link.send(frame, source)
-
-    def totals(self) -> Counters:
-        """Everything counted on this link."""
-        total = Counters()
-        total.add(self.counters)
-        for parser in self._parsers.values():
-            total.add(parser.counters)
-        return total
+LONGEST_WAIT: Final = 1.0  # s
 
 
 class Live:
@@ -101,13 +39,21 @@ class Live:
         self._clock = clock
         self._config = config
         self._component = Component(config.identity.component, config.identity.system)
-        self.stations = [Station(link, False) for link in config.links] + [Station(out, True) for out in config.outs]
-        self.plant = Plant(config, self, stdout)
+        self.stations: list[Station] = []
         self._routes: dict[tuple[int, int], tuple[Station, Address]] = {}
-        self._beat_at = -math.inf
-        self._told_at = math.inf
+        """Where the heartbeats of each vehicle come from; no longer than the hardware's list of vehicles."""
+        self._asks = config.requests == "missing" and not all(link.passive for link in config.links)
+        self._beat_at = self._told_at = -math.inf
         self._stop = False
-        self._wake_read, self._wake_write = socket.socketpair()
+        self._handlers: dict[int, Any] = {}
+        with ExitStack() as opened:  # what fails half-way leaves nothing open
+            for link, is_out in [*((link, False) for link in config.links), *((out, True) for out in config.outs)]:
+                self.stations.append(Station(link, is_out))
+                opened.callback(self.stations[-1].link.close)
+            self.plant = Plant(config, self, stdout)
+            self.plant.hw.own_system = config.identity.system
+            self._wake_read, self._wake_write = socket.socketpair()
+            opened.pop_all()
         self._wake_read.setblocking(False)
         self._wake_write.setblocking(False)
         for station in self.stations:
@@ -122,12 +68,13 @@ class Live:
     def stop(self) -> None:
         """Make `run` return soon; may be called from a signal handler or another thread."""
         self._stop = True
-        self._wake_write.send(b"x")
+        with suppress(OSError):  # closed by now, or told often enough
+            self._wake_write.send(b"x")
 
     def stop_on_signals(self) -> None:
-        """SIGINT and SIGTERM stop the gateway. Only in the main thread."""
+        """SIGINT and SIGTERM stop the gateway, until it is closed. Only in the main thread."""
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: self.stop())
+            self._handlers[number] = signal.signal(number, lambda *_: self.stop())
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Turn the loop until `stop`, or until `until` says so at one of its turns.
@@ -143,10 +90,12 @@ class Live:
             while not (self._stop or until()):
                 self._watch(poll, watched)
                 self.turn(now)
-                wait = max(0.0, self._next_due(now.mono) - self._clock().mono)
-                events = poll.poll(math.ceil(min(wait, 1.0) * 1000))
+                due = min(self._next_due(now.mono), now.mono + LONGEST_WAIT)
+                wait = due - self._clock().mono
+                # rounded up to milliseconds: rounded down, the loop would spin until the moment has come
+                events = poll.poll(math.ceil(wait * 1000) if wait > 0 else 0)
                 if self._config.coalesce and events:
-                    time.sleep(min(self._config.coalesce, wait))
+                    self._gather(due)
                 now = self._clock()
                 for descriptor, _ in events:
                     if descriptor in watched:
@@ -157,7 +106,7 @@ class Live:
     def turn(self, now: Instant) -> None:
         """Everything that is due at `now`."""
         self.plant.tick(now)
-        if self._config.requests == "missing":
+        if self._asks:
             self._ask(now)
         if self._config.identity.heartbeat and now.mono - self._beat_at >= HEARTBEAT_PERIOD:
             self._beat(now)
@@ -166,14 +115,21 @@ class Live:
 
     def close(self) -> None:
         """Stop the plant, close the links, tell in the log what was counted."""
-        try:
-            self.plant.close(self._clock())
-        finally:
+        with ExitStack() as steps:  # each is done, whatever the others raise
+            for number, handler in self._handlers.items():
+                steps.callback(signal.signal, number, handler)
+            steps.callback(self._wake_read.close)
+            steps.callback(self._wake_write.close)
             for station in self.stations:
-                station.link.close()
-                self._tell_counters(station)
-            self._wake_read.close()
-            self._wake_write.close()
+                steps.callback(station.link.close)
+                steps.callback(self._tell_counters, station)
+            steps.callback(self.plant.close, self._clock())
+
+    def _gather(self, due: float) -> None:
+        """Let more input come, so that fewer wake-ups serve it; `stop` ends this, and so does what falls due."""
+        seconds = min(self._config.coalesce, due - self._clock().mono)
+        if seconds > 0:
+            select.select([self._wake_read], [], [], seconds)
 
     def _watch(self, poll: select.poll, watched: dict[int, Station]) -> None:
         """Wait also for links that have got a descriptor since."""
@@ -190,6 +146,7 @@ class Live:
             for frame in station.parser(source).feed(data):
                 if frame.message_id == 0:
                     self._component.heard(frame)
+                    self.plant.hw.own_component = self._component.id
                 if station.is_out:
                     continue
                 tracked = self.plant.take(frame, now)
@@ -198,11 +155,10 @@ class Live:
                     self._routes[tracked.ids] = (station, source)
 
     def _ask(self, now: Instant) -> None:
-        for ask in self.plant.hw.write(now):
+        passive = {ids for ids, (station, _) in self._routes.items() if station.passive}
+        for ask in self.plant.hw.write(now, passive):
             station, source = self._routes[ask.system, ask.component]
-            if not station.passive:
-                frame = self._component.frame(ask.message, ask.system)
-                station.link.send(frame, source if station.listens else None)
+            station.answer(self._component.frame(ask.message, ask.system), source)
 
     def _beat(self, now: Instant) -> None:
         """Our heartbeat, once a second: beside each vehicle heard; alone only where we must speak first."""

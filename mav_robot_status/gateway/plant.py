@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from ..config import ControllerConfig, PublisherConfig
-from ..errors import ConfigError
+from ..errors import ConfigError, MavRobotStatusError
 from ..hardware.robot_hw import MavlinkRobotHW, Slot
 from ..interface import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle, LinkState, PublisherContext
 from . import plugins
+from .guard import Guard, GuardedPublisher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from ..clock import Instant
     from ..config import Config
@@ -33,17 +35,16 @@ DEFAULT_CONTROLLER: Final = ControllerConfig(
 
 def check(config: Config) -> None:
     """Raise ConfigError for a controller or publisher that is not registered, or a handle that nobody registers."""
+    handles = [v.handle for v in config.vehicles] or [DEFAULT_HANDLE_NAME]
     for controller in config.controllers:
         plugins.load(plugins.CONTROLLERS, controller.type, controller.where)
         for publisher in _publishers(controller):
             plugins.load(plugins.PUBLISHERS, publisher.type, controller.where)
         name = handle_name(controller)
-        if not config.vehicles and name != DEFAULT_HANDLE_NAME:
-            raise ConfigError(
-                f"{controller.where}: there is no handle '{name}'; without `vehicles` there is "
-                f"'{DEFAULT_HANDLE_NAME}', of the first autopilot heard. "
-                f"Write `vehicles: [{{handle: {name}}}]` to give it that name"
-            )
+        if name not in handles and not _is_default(controller):
+            there_are = f"there is no handle '{name}'; registered: " + ", ".join(f"'{h}'" for h in handles)
+            hint = "" if config.vehicles else f". Write `vehicles: [{{handle: {name}}}]` to register it"
+            raise ConfigError(f"{controller.where}: {there_are}{hint}")
 
 
 def handle_name(controller: ControllerConfig) -> str:
@@ -51,17 +52,23 @@ def handle_name(controller: ControllerConfig) -> str:
     return str(controller.parameters.get("handle_name", DEFAULT_HANDLE_NAME))
 
 
+def _is_default(controller: ControllerConfig) -> bool:
+    """True for the default controller, perhaps with the command line's options: there is one for each handle."""
+    return controller.where == DEFAULT_CONTROLLER.where
+
+
 def _publishers(controller: ControllerConfig) -> tuple[PublisherConfig, ...]:
     return DEFAULT_PUBLISHERS if controller.publishers is None else controller.publishers
 
 
 class _Post:
-    """A controller and the handle that it waits for, or publishes."""
+    """A controller, under guard, and the handle that it waits for, or publishes."""
 
-    __slots__ = ("controller", "handle", "running")
+    __slots__ = ("controller", "guard", "handle", "running")
 
-    def __init__(self, controller: Any, handle: IndustrialRobotStatusHandle) -> None:
+    def __init__(self, name: str, controller: Any, handle: IndustrialRobotStatusHandle) -> None:
         self.controller = controller
+        self.guard = Guard(f"controller '{name}'")
         self.handle = handle
         self.running = False
 
@@ -74,6 +81,7 @@ class Plant:
         slots = [Slot(v.system, v.component, v.handle) for v in config.vehicles]
         self.hw = MavlinkRobotHW(config.hardware, slots, config.identity.component)
         self._config = config
+        self._controllers = config.controllers or (DEFAULT_CONTROLLER,)
         self._context = PublisherContext({}, port, stdout, patient)
         self.publishers: dict[tuple[str, str], Publisher] = {}
         self._posts: list[_Post] = []
@@ -83,7 +91,12 @@ class Plant:
         self._service_due = math.inf
         self._last: float | None = None
         check(config)
-        self._attend()
+        with ExitStack() as undo:
+            undo.callback(self._close_publishers)
+            for controller in self._controllers:  # before a vehicle is heard: what is wrong with an output shows now
+                self._publishers(controller)
+            self._attend()
+            undo.pop_all()
 
     def take(self, frame: Frame, now: Instant) -> Tracked | None:
         """Take one frame; the vehicle if it is an autopilot's heartbeat."""
@@ -97,10 +110,10 @@ class Plant:
         self._last = now.mono
         for post in self._posts:
             if not post.running and self._may_start(post):
-                post.controller.starting(now)
+                post.guard.call(None, post.controller.starting, now)
                 post.running = True
             if post.running:
-                post.controller.update(now, period)
+                post.guard.call(None, post.controller.update, now, period)
         self._service_due = math.inf
         for publisher in self.publishers.values():
             again = publisher.service(now)
@@ -112,7 +125,7 @@ class Plant:
         due = min(self.hw.next_due(), self._service_due)
         for post in self._posts:
             if post.running:
-                due = min(due, post.controller.next_due(now))
+                due = min(due, post.guard.call(math.inf, post.controller.next_due, now))
             elif self._may_start(post):
                 return now
         return due
@@ -124,14 +137,20 @@ class Plant:
 
     def close(self, now: Instant) -> None:
         """Stop the controllers, close the publishers."""
-        self._stop(now)
-        for publisher in self.publishers.values():
-            publisher.close()
+        try:
+            self._stop(now)
+        finally:
+            self._close_publishers()
+
+    def _close_publishers(self) -> None:
+        with ExitStack() as steps:  # each is closed, whatever the others raise
+            for publisher in self.publishers.values():
+                steps.callback(publisher.close)
 
     def _stop(self, now: Instant) -> None:
         for post in self._posts:
             if post.running:
-                post.controller.stopping(now)
+                post.guard.call(None, post.controller.stopping, now)
                 post.running = False
 
     def _may_start(self, post: _Post) -> bool:
@@ -139,28 +158,50 @@ class Plant:
 
     def _attend(self) -> None:
         """Make the controllers of handles that have become known."""
-        for name in self.hw.handles.get_names():
+        names = self.hw.handles.get_names()
+        if len(names) == len(self._seen):
+            return
+        for name in names:
             if name in self._seen:
                 continue
             self._seen.add(name)
-            for controller in self._config.controllers or (DEFAULT_CONTROLLER,):
-                if controller.where == DEFAULT_CONTROLLER.where:
-                    # the default controller, perhaps with the command line's options: one for each handle
+            for controller in self._controllers:
+                if _is_default(controller):
                     parameters = {**controller.parameters, "handle_name": name}
                     self._post(dataclasses.replace(controller, parameters=parameters))
                 elif handle_name(controller) == name:
                     self._post(controller)
 
     def _post(self, config: ControllerConfig) -> None:
-        controller = plugins.load(plugins.CONTROLLERS, config.type, config.where)()
-        publishers = [self._publisher(p, config.where) for p in _publishers(config)]
-        controller.init(self.hw, config.parameters, publishers)
-        self._posts.append(_Post(controller, controller.handle))
+        """Raises ConfigError if the controller cannot be made."""
+        make = plugins.load(plugins.CONTROLLERS, config.type, config.where)
+        publishers = self._publishers(config)
+        with _explained(f"{config.where}: controller '{config.name}'"):
+            controller = make()
+            controller.init(self.hw, config.parameters, publishers)
+            self._posts.append(_Post(config.name, controller, controller.handle))
+
+    def _publishers(self, config: ControllerConfig) -> list[Publisher]:
+        return [self._publisher(p, config.where) for p in _publishers(config)]
 
     def _publisher(self, config: PublisherConfig, where: str) -> Publisher:
         """One publisher for each type and set of options: two controllers may share an output."""
         key = (config.type, repr(sorted(config.options.items())))
         if key not in self.publishers:
-            create: Callable[[PublisherContext], Publisher] = plugins.load(plugins.PUBLISHERS, config.type, where)
-            self.publishers[key] = create(self._context._replace(options=config.options))
+            make: Callable[[PublisherContext], Publisher] = plugins.load(plugins.PUBLISHERS, config.type, where)
+            with _explained(f"{where}: publisher '{config.type}'"):
+                made = make(self._context._replace(options=config.options))
+            ours = config.type in plugins.OURS[plugins.PUBLISHERS]
+            self.publishers[key] = made if ours else GuardedPublisher(made, config.type)
         return self.publishers[key]
+
+
+@contextmanager
+def _explained(what: str) -> Iterator[None]:
+    """Whatever a third party's code raises while it is made is a ConfigError."""
+    try:
+        yield
+    except MavRobotStatusError:
+        raise
+    except Exception as error:
+        raise ConfigError(f"{what} cannot be made: {type(error).__name__}: {error}") from error

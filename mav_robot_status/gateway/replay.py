@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import Instant, later
-from ..hardware.robot_hw import WANTED_IDS
-from ..link.log import LogReader
-from ..mavlink.framing import Parser
 from .plant import Plant
+from .recorded import Recording
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
     from typing import TextIO
 
     from ..config import Config
+    from ..link.log import Stamped
+    from ..mavlink.framing import Frame
 
 log = logging.getLogger(__name__)
+
+NEVER: Final = Instant(0.0, 0)
+"""When a log ends in which nothing was read."""
 
 
 class Nobody:
@@ -28,33 +33,33 @@ class Nobody:
 
 def replay(config: Config, path: str, stdout: TextIO) -> None:
     """Replay the log at `path`. Raises UsageError if it cannot be read, BrokenPipeError if nobody reads the lines."""
-    reader = LogReader(path)
+    recording = Recording(path)
     log.info("replaying %s", path)
     plant = Plant(config, Nobody(), stdout, patient=True)
-    parser = Parser(WANTED_IDS)
-    last: Instant | None = None
-    for record in reader:
-        now = record.now
-        if record.new_segment and last is not None:
-            plant.forget(last)
-            parser.reset()
-        elif last is not None:
-            live_through(plant, last, now)
-        for frame in parser.feed(record.data):
-            plant.take(frame, now)
-        plant.tick(now)
-        last = now
-    if last is not None:
+    last = NEVER
+    try:
+        for now, _ in run_through(plant, recording):
+            last = now
+    finally:
         plant.close(last)
-    counters = parser.counters
-    log.info(
-        "%s; %d frames, %d lost, %d with a bad CRC, %d of unknown kind",
-        reader.summary(),
-        counters.frames,
-        counters.lost,
-        sum(counters.bad_crc.values()),
-        sum(counters.unknown.values()),
-    )
+    log.info("%s", recording.summary())
+
+
+def run_through(plant: Plant, recording: Iterable[Stamped]) -> Iterator[tuple[Instant, Frame | None]]:
+    """Feed a recording to the plant; gives each instant after the plant has lived it."""
+    last: Instant | None = None
+    due = -math.inf
+    for now, frame, new_segment in recording:
+        if last is not None and new_segment:
+            plant.forget(last)
+        elif last is not None and due < now.mono:
+            live_through(plant, last, now)
+        if frame is not None:
+            plant.take(frame, now)
+            plant.tick(now)
+        due = plant.next_due(now.mono)
+        last = now
+        yield now, frame
 
 
 def live_through(plant: Plant, last: Instant, until: Instant) -> None:

@@ -30,10 +30,13 @@ def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> tuple[Boot, bool]:
     if boot.clock_ms is None:
         return Boot(booted, time_boot_ms), False
     step = _difference(time_boot_ms, boot.clock_ms)
-    if step >= -STEP_BACK_MS:
-        return Boot(
-            boot.at if step < 0 else booted, max(time_boot_ms, boot.clock_ms) if step < 0 else time_boot_ms
-        ), False
+    if -STEP_BACK_MS <= step <= 0:
+        return boot._replace(doubt_ms=None), False
+    if step > 0:
+        # on its way a sample is only ever held up, so the earliest boot is the truest; after 49 days the clock wraps
+        late = step < 0 or booted - boot.at < STEP_BACK_MS / 1000
+        at = min(boot.at, booted) if late else booted
+        return Boot(at, time_boot_ms), False
     if boot.doubt_ms is None or _difference(time_boot_ms, boot.doubt_ms) < 0:
         return boot._replace(doubt_ms=time_boot_ms), False
     return Boot(booted, time_boot_ms), True

@@ -6,6 +6,7 @@ lost. Numbers are stable: they are never reused, new ones are appended.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -70,7 +71,7 @@ CAUSES: Final[dict[int, Cause]] = {
     5003: Cause("WATCHDOG_RESET", 25, ARMING),
     5004: Cause("REBOOT_WHILE_ARMED", 26, ARMING),
     2000: Cause("FAILSAFE", 27),
-    9002: Cause("SYSTEM_ID_CONFLICT", 28),
+    9002: Cause("SYSTEM_ID_CONFLICT", 28, HOLD, 10.0),
     9001: Cause("LINK_LOST", 29),
     **{3100 + bit: Cause(f"SENSOR_{EXTENDED_SENSOR_NAMES.get(bit, bit)}", 200 + bit) for bit in range(32)},
     **{3000 + bit: Cause(f"SENSOR_{SENSOR_NAMES[bit]}", 100 + bit) for bit in range(31)},
@@ -80,6 +81,7 @@ CAUSES: Final[dict[int, Cause]] = {
 
 SOFT_AFTER: Final = 50  # a SOFT bit comes after every HARD one
 
+TIMED_TEXTS: Final = frozenset({6000, 6001, 6002})  # held for `text_hold_s`
 # State CRITICAL says that some failsafe is active; each of these says which.
 NAMED_FAILSAFES: Final = frozenset({*range(2001, 2014), 3014, 3016, 3020, 3021, 3025, 5001})
 # State EMERGENCY without one of these is 4000.
@@ -93,20 +95,24 @@ class Latch(NamedTuple):
     since: Instant
     last: float
     """Monotonic seconds of the latest announcement."""
+    source: str
+    """What announced it: a message, with the text where it has one."""
 
 
 Latches = Mapping[int, Latch]
 NO_LATCHES: Final[Latches] = {}
 
 
-def announce(latches: Latches, code: int, text: str | None, now: Instant) -> Latches:
-    """`latches` after `code` was announced with these words."""
+def announce(latches: Latches, code: int, text: str | None, now: Instant, source: str | None = None) -> Latches:
+    """`latches` after `code` was announced: with these words of the autopilot, or by another `source`."""
     worse = CAUSES[code].worse
-    if worse in latches:
-        assert worse is not None
+    if worse is not None and worse in latches:
         code, text = worse, latches[worse].text
     before = latches.get(code)
-    return {**latches, code: Latch(text, before.since if before else now, now.mono)}
+    return {
+        **latches,
+        code: Latch(text, before.since if before else now, now.mono, source or f"STATUSTEXT: {text}"),
+    }
 
 
 def clear(latches: Latches, codes: tuple[int, ...]) -> Latches:
@@ -118,19 +124,19 @@ def lasting(latches: Latches, pulse: Pulse, now: float, text_hold: float) -> Lat
     """The latches that time and the state of the vehicle have not ended at `now`."""
     if not latches:
         return latches
-    return {code: latch for code, latch in latches.items() if not _ended(code, latch, pulse, now, text_hold)}
+    return {code: latch for code, latch in latches.items() if now < ends_at(code, latch, pulse, text_hold)}
 
 
-def _ended(code: int, latch: Latch, pulse: Pulse, now: float, text_hold: float) -> bool:
+def ends_at(code: int, latch: Latch, pulse: Pulse, text_hold: float) -> float:
+    """When (monotonic seconds) a latch ends if nothing more is heard; never is infinity."""
     cause = CAUSES[code]
-    age = now - latch.last
     if cause.clears is Clears.FAILSAFE:
-        calm = pulse.calm_since
-        if calm is None or age < 5.0:
-            return False
-        return now - calm >= 2.0 or (not pulse.armed and now - pulse.edge.mono >= 5.0)
-    hold = text_hold if code in (6000, 6001, 6002) else cause.hold
-    return hold is not None and age >= hold
+        if pulse.calm_since is None:
+            return math.inf
+        calm = pulse.calm_since + 2.0
+        return max(latch.last + 5.0, calm if pulse.armed else min(calm, pulse.edge.mono + 5.0))
+    hold = text_hold if code in TIMED_TEXTS else cause.hold
+    return math.inf if hold is None else latch.last + hold
 
 
 def error(code: int, text: str | None, since_us: int) -> ErrorCause:

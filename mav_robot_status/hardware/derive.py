@@ -6,7 +6,7 @@ motion_possible FALSE. I3 error_code != 0 <=> in_error TRUE. I4 link stale => ev
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..interface.status import (
@@ -46,6 +46,7 @@ TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 UNINIT, BOOT, CALIBRATING, STANDBY, CRITICAL, EMERGENCY, POWEROFF = 0, 1, 2, 3, 5, 6, 7  # MAV_STATE
 UNDEFINED, ON_GROUND = 0, 1  # MAV_LANDED_STATE
 IN_THE_AIR: Final = frozenset({2, 3, 4})
+TOGETHER: Final = 5.0  # s between a loss and a failsafe that it explains
 NOT_MOVING_STATES: Final = frozenset({BOOT, CALIBRATING, EMERGENCY, POWEROFF, TERMINATED})
 
 INHIBITS: Final = (
@@ -97,7 +98,7 @@ def derive(memory: Memory, ids: tuple[int, int], before: Detail, now: Instant, o
     """The status of the vehicle with these (system, component) ids at `now`; `before` is the previous detail."""
     beat = memory.observation.heartbeat
     assert beat is not None  # a memory begins with a heartbeat
-    if now.mono - beat.at > options.heartbeat_timeout:
+    if now.mono > beat.at + options.heartbeat_timeout:
         return _lost(memory, ids, before, now, options)
     sys_status = memory.observation.sys_status
     fresh = sys_status is not None and is_fresh(sys_status, now.mono, options.sys_status_timeout)
@@ -113,16 +114,16 @@ def derive(memory: Memory, ids: tuple[int, int], before: Detail, now: Instant, o
     sources = ModeSources(memory.modes, memory.observation.current_mode, options.mode_overrides)
     mode = flight_mode(view.heartbeat, memory.stack, memory.family, sources, now.mono)
     stopped, why_stopped = e_stopped(view)
-    drives, why_drives = drives_powered(view, stopped)
-    possible, why_possible = motion_possible(view, mode, stopped, drives)
+    drives, why_drives = drives_powered(view, stopped, why_stopped)
+    possible, why_possible = motion_possible(view, mode, drives, why_drives)
     moving, why_moving = in_motion(view)
     errors = active_errors(view)
     wrong, why_wrong = in_error(view, errors)
-    status = RobotStatus(mode.mode, stopped, drives, possible, moving, wrong, errors[0].code if errors else 0)
+    status = RobotStatus(mode.mode, stopped, drives, possible, moving, wrong, errors[0].cause.code if errors else 0)
     detail = Detail(
         ids[0],
         ids[1],
-        errors,
+        tuple(error.cause for error in errors),
         () if possible is TRUE else inhibits(view, mode, stopped, before, now),
         Vehicle(
             named(AUTOPILOT_NAMES, view.heartbeat.autopilot),
@@ -151,7 +152,7 @@ def _lost(memory: Memory, ids: tuple[int, int], before: Detail, now: Instant, op
     beat = memory.observation.heartbeat
     why = Evidence("no heartbeat within heartbeat_timeout", "HEARTBEAT", beat.at if beat else None)
     evidence = dict.fromkeys(RobotStatus._fields[:-1], why)
-    status, errors = RobotStatus(), ()
+    status = RobotStatus()
     if options.link_loss_is_error:
         since = next((e.since_us for e in before.errors if e.code == 9001), now.unix_us)
         return Derived(
@@ -159,7 +160,7 @@ def _lost(memory: Memory, ids: tuple[int, int], before: Detail, now: Instant, op
             Detail(ids[0], ids[1], (causes.error(9001, None, since),), (inhibit,), vehicle, LinkState.LOST),
             evidence,
         )
-    return Derived(status, Detail(ids[0], ids[1], errors, (inhibit,), vehicle, LinkState.LOST), evidence)
+    return Derived(status, Detail(ids[0], ids[1], (), (inhibit,), vehicle, LinkState.LOST), evidence)
 
 
 def named(names: Mapping[int, str], number: int) -> str:
@@ -201,10 +202,10 @@ def _ardupilot_stop(view: View) -> Finding:
     if view.status is not None and sensors.safety_switch_on(view.status):
         return TRUE, Evidence("safety switch engaged", "SYS_STATUS: MOTOR_OUTPUTS present, not enabled", view.status_at)
     if told is TRUE:
-        return TRUE, Evidence("the autopilot said so", f"STATUSTEXT: {stop.text}", stop.last)
+        return TRUE, Evidence("the autopilot said so", stop.source, stop.last)
     latches = causes.lasting(memory.latches, memory.pulse, now, view.options.text_hold_s)
     if 1002 in latches:
-        return TRUE, Evidence("termination announced", f"STATUSTEXT: {latches[1002].text}", latches[1002].last)
+        return TRUE, Evidence("termination announced", latches[1002].source, latches[1002].last)
     if view.state == TERMINATED:
         return TRUE, _beat(view, "state FLIGHT_TERMINATION")
     watched, why = _watched(view)
@@ -215,7 +216,7 @@ def _ardupilot_stop(view: View) -> Finding:
             "the pre-arm checks, which include the stop, pass", "SYS_STATUS: PREARM_CHECK", stop.ready_at
         )
     if told is FALSE:
-        return FALSE, Evidence("the autopilot said so", f"STATUSTEXT: {stop.text}", stop.last)
+        return FALSE, Evidence("the autopilot said so", stop.source, stop.last)
     if watched is FALSE:
         return FALSE, why
     if view.armed and view.options.estop_assume_visible and memory.assumed_free:
@@ -231,7 +232,7 @@ def _watched(view: View) -> Finding:
         return UNKNOWN, Evidence("the outputs are not watched")
     if memory.observation.esc is not None and is_fresh(memory.observation.esc, now, motion.FRESH):
         return FALSE, Evidence("a motor turns", "ESC telemetry: rpm", memory.observation.esc.at)
-    if watch.at is None or now - watch.at > motion.FRESH:
+    if watch.at is None or now > watch.at + motion.FRESH:
         return UNKNOWN, Evidence("no fresh SERVO_OUTPUT_RAW")
     value = outputs.verdict(watch, memory.family, memory.vehicle_type, driving_speed(memory), now)
     motors, assumed = outputs.channels(watch, memory.vehicle_type)
@@ -251,7 +252,7 @@ def _beat(view: View, rule: str) -> Evidence:
 # -- drives_powered, motion_possible -----------------------------------------------------------------------------------
 
 
-def drives_powered(view: View, stopped: TriState) -> Finding:
+def drives_powered(view: View, stopped: TriState, why_stopped: Evidence) -> Finding:
     """Armed, and neither blocked by hardware-in-the-loop nor stopped."""
     source = f"HEARTBEAT.base_mode {view.heartbeat.base_mode}"
     if not view.armed:
@@ -259,16 +260,16 @@ def drives_powered(view: View, stopped: TriState) -> Finding:
     if view.hil:
         return FALSE, Evidence("hardware in the loop: actuators blocked", source, view.heard_at)
     if stopped is TRUE:
-        return FALSE, Evidence("e_stopped")
+        return FALSE, why_stopped._replace(rule=f"e_stopped: {why_stopped.rule}")
     if view.state == TERMINATED:
         return FALSE, _beat(view, "state FLIGHT_TERMINATION")
     return TRUE, Evidence("armed", source, view.heard_at)
 
 
-def motion_possible(view: View, mode: FlightMode, stopped: TriState, drives: TriState) -> Finding:
+def motion_possible(view: View, mode: FlightMode, drives: TriState, why_drives: Evidence) -> Finding:
     """Whether a motion command would move the vehicle now. Errors and sensors have no say."""
-    if drives is FALSE or stopped is TRUE:
-        return FALSE, Evidence("drives_powered is false" if stopped is not TRUE else "e_stopped")
+    if drives is FALSE:
+        return FALSE, why_drives._replace(rule=f"drives_powered is false: {why_drives.rule}")
     if view.state in NOT_MOVING_STATES:
         return FALSE, _beat(view, "a state in which the vehicle does not move")
     if is_initialising(view.heartbeat, view.memory.stack, view.memory.family):
@@ -326,7 +327,8 @@ def _on_ground(view: View) -> bool:
 def _velocity_source(view: View) -> tuple[str | None, float | None]:
     """The message that gives the speed now, in the order of preference."""
     observation = view.memory.observation
-    if view.memory.motion == motion.UNKNOWN:
+    speed = view.memory.motion.speed
+    if speed is None:
         return None, None  # the latest sample said that there is no estimate
     for name, heard in (
         ("GLOBAL_POSITION_INT", observation.global_position),
@@ -334,42 +336,78 @@ def _velocity_source(view: View) -> tuple[str | None, float | None]:
         ("VFR_HUD", observation.vfr_hud),
     ):
         if heard is not None and is_fresh(heard, view.now, motion.FRESH):
-            return name, heard.at
+            return f"{name}: {speed:.2f} m/s", heard.at
     return None, None
 
 
 # -- in_error ----------------------------------------------------------------------------------------------------------
 
 
-def active_errors(view: View) -> tuple[ErrorCause, ...]:
+class Error(NamedTuple):
+    """An active cause with its place in the order, and what showed it."""
+
+    cause: ErrorCause
+    priority: int
+    source: str
+    at: float
+
+
+def active_errors(view: View) -> list[Error]:
     """Every active cause, the most important first."""
+    found = {error.cause.code: error for error in (*_announced(view), *_counted(view), *_faulty(view))}
+    for error in _of_state(view, found.keys()):
+        found.setdefault(error.cause.code, error)
+    return sorted(found.values(), key=lambda error: error.priority)
+
+
+def _error(code: int, text: str | None, since_us: int, source: str, at: float, later: int = 0) -> Error:
+    return Error(causes.error(code, text, since_us), causes.CAUSES[code].priority + later, source, at)
+
+
+def _announced(view: View) -> Iterator[Error]:
     memory = view.memory
-    pulse = memory.pulse
-    latches = causes.lasting(memory.latches, pulse, view.now, view.options.text_hold_s)
-    found = {code: causes.error(code, latch.text, latch.since.unix_us) for code, latch in latches.items()}
-    weights = {code: causes.CAUSES[code].priority for code in found}
+    latches = causes.lasting(memory.latches, memory.pulse, view.now, view.options.text_hold_s)
+    for code, latch in latches.items():
+        yield _error(code, latch.text, latch.since.unix_us, latch.source, latch.last)
 
-    def add(code: int, text: str | None, since_us: int, later: int = 0) -> None:
-        if code not in found:
-            found[code] = causes.error(code, text, since_us)
-            weights[code] = causes.CAUSES[code].priority + later
 
-    if memory.internal_errors_since is not None and view.status is not None:
-        add(5001, None, memory.internal_errors_since.unix_us)
-    if view.now - memory.boot.at >= GRACE and view.status is not None:
-        for bit, weight, fault in sensors.standing(memory.faults, memory.stack, view.armed, view.now):
-            if sensor_name(bit) not in view.options.ignore_sensors:
-                code = 3000 + bit if bit < 32 else 3100 + bit - 32
-                add(code, None, fault.since.unix_us, causes.SOFT_AFTER if weight is sensors.SOFT else 0)
+def _counted(view: View) -> Iterator[Error]:
+    since = view.memory.internal_errors_since
+    if since is not None and view.status is not None and view.status_at is not None:
+        count = view.status.errors_count1 | view.status.errors_count2 << 16
+        yield _error(5001, None, since.unix_us, f"SYS_STATUS.errors_count 0x{count:x}", view.status_at)
+
+
+def _faulty(view: View) -> Iterator[Error]:
+    memory = view.memory
+    if not memory.faults or view.status_at is None or view.now < memory.boot.at + GRACE:
+        return
+    for bit, weight, fault in sensors.standing(memory.faults, memory.stack, view.armed, view.now):
+        name = sensor_name(bit)
+        if name not in view.options.ignore_sensors:
+            code = 3000 + bit if bit < 32 else 3100 + bit - 32
+            later = causes.SOFT_AFTER if weight is sensors.SOFT else 0
+            source = f"SYS_STATUS: {name} enabled, unhealthy"
+            yield _error(code, None, fault.since.unix_us, source, view.status_at, later)
+
+
+def _of_state(view: View, found: Collection[int]) -> Iterator[Error]:
+    """What HEARTBEAT.system_status says, where nothing else has named it."""
+    memory = view.memory
     words = memory.failsafe.text if memory.failsafe is not None else None
-    since = pulse.state_since.unix_us
+    since = memory.pulse.state_since.unix_us
+    source = f"HEARTBEAT.system_status {named(STATE_NAMES, view.state)}"
     if view.state == TERMINATED and not view.heartbeat.base_mode & HIL:
-        add(1001, words, since)
-    if view.state == EMERGENCY and not causes.NAMED_EMERGENCIES & found.keys():
-        add(4000, words, since)
-    if view.state == CRITICAL and not causes.NAMED_FAILSAFES & found.keys():
-        add(2000, words, since)
-    return tuple(found[code] for code in sorted(found, key=weights.__getitem__))
+        yield _error(1001, words, since, source, view.heard_at)
+    if view.state == EMERGENCY and not causes.NAMED_EMERGENCIES.intersection(found):
+        yield _error(4000, words, since, source, view.heard_at)
+    if view.state == CRITICAL and not causes.NAMED_FAILSAFES.intersection(found):
+        rc_lost = memory.rc_lost_since
+        if rc_lost is not None and abs(rc_lost.mono - memory.pulse.state_since.mono) <= TOGETHER:
+            source = f"{source}, as SYS_STATUS: RC_RECEIVER turned unhealthy"
+            yield _error(2001, words, since, source, view.heard_at)
+        else:
+            yield _error(2000, words, since, source, view.heard_at)
 
 
 def sensor_name(bit: int) -> str:
@@ -379,13 +417,11 @@ def sensor_name(bit: int) -> str:
     return EXTENDED_SENSOR_NAMES.get(bit - 32, str(bit - 32))
 
 
-def in_error(view: View, errors: tuple[ErrorCause, ...]) -> Finding:
+def in_error(view: View, errors: list[Error]) -> Finding:
     """TRUE with any cause; FALSE only while SYS_STATUS is there to show one."""
     if errors:
         first = errors[0]
-        return TRUE, Evidence(
-            f"{first.code} {first.name}", f"STATUSTEXT: {first.text}" if first.text else "HEARTBEAT, SYS_STATUS"
-        )
+        return TRUE, Evidence(f"{first.cause.code} {first.cause.name}", first.source, first.at)
     if view.status is None:
         return UNKNOWN, Evidence("no fresh SYS_STATUS")
     return FALSE, Evidence("no cause is active", "SYS_STATUS", view.status_at)
@@ -408,7 +444,7 @@ def inhibits(view: View, mode: FlightMode, stopped: TriState, before: Detail, no
     if not view.armed:
         reasons["DISARMED"] = None
     if stopped is TRUE:
-        reasons["E_STOPPED"] = memory.stop.text or None
+        reasons["E_STOPPED"] = memory.stop.text
     if switch:
         reasons["SAFETY_SWITCH"] = None
     if not view.armed and _is_not_ready(view):

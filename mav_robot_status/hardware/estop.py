@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from .pulse import Pulse
 
 SETTLING: Final = 2.0
-"""Seconds after a disarm (or after connecting) before a healthy PREARM_CHECK bit says anything: it is recomputed once a
-second, and forced healthy while armed."""
+"""Seconds after a disarm, a connection or a word on the stop before a healthy PREARM_CHECK bit says anything: it is
+recomputed once a second, and forced healthy while armed."""
 READY_MESSAGES: Final = 2
 REPEATED: Final = 35.0
 """Seconds after which a PreArm text that is no longer repeated (every 30 s) is over."""
@@ -30,7 +30,10 @@ class Stop(NamedTuple):
 
     said: TriState = TriState.UNKNOWN
     """TRUE engaged, FALSE released, UNKNOWN nothing said."""
-    text: str = ""
+    text: str | None = None
+    """The autopilot's words, if it was a text."""
+    source: str = ""
+    """What said so: a message, with the text where it has one."""
     since: Instant | None = None
     last: float = 0.0
     repeats: bool = False
@@ -43,12 +46,19 @@ class Stop(NamedTuple):
 NOTHING: Final = Stop()
 
 
-def said(stop: Stop, engaged: bool, text: str, now: Instant) -> Stop:
-    """`stop` after a text about an emergency stop."""
+def said(stop: Stop, engaged: bool, text: str | None, now: Instant, source: str | None = None) -> Stop:
+    """`stop` after it was said that an emergency stop is engaged or released: in a text, or by another `source`."""
     value = TriState.TRUE if engaged else TriState.FALSE
-    since = stop.since if stop.said is value else now
-    repeats = engaged and "MotorEStop" not in text
-    return Stop(value, text, since, now.mono, repeats, 0 if engaged else stop.ready, stop.ready_at)
+    return Stop(
+        said=value,
+        text=text,
+        source=source or f"STATUSTEXT: {text}",
+        since=stop.since if stop.said is value else now,
+        last=now.mono,
+        repeats=engaged and text is not None and "MotorEStop" not in text,
+        ready=0 if engaged else stop.ready,
+        ready_at=stop.ready_at,
+    )
 
 
 def heard_sys_status(stop: Stop, status: SysStatus, pulse: Pulse, stack: Stack, now: float) -> Stop:
@@ -58,7 +68,7 @@ def heard_sys_status(stop: Stop, status: SysStatus, pulse: Pulse, stack: Stack, 
         or pulse.armed
         or safety_switch_on(status)
         or not is_ready(status, stack)
-        or now - pulse.edge.mono < SETTLING
+        or now - max(pulse.edge.mono, stop.last) < SETTLING
     ):
         return stop._replace(ready=0) if stop.ready else stop
     ready = stop.ready + 1
@@ -69,6 +79,6 @@ def heard_sys_status(stop: Stop, status: SysStatus, pulse: Pulse, stack: Stack, 
 
 def still_said(stop: Stop, now: float) -> TriState:
     """What the texts say at `now`."""
-    if stop.repeats and now - stop.last >= REPEATED:
+    if stop.repeats and now >= stop.last + REPEATED:
         return TriState.UNKNOWN
     return stop.said

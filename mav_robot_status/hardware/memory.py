@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from ..clock import Instant
 from . import causes, estop, outputs, sensors, statustext
 from .boot import Boot
+from .commands import Asked
 from .flight_mode import AvailableMode
 from .identity import Family, Stack, family_of, stack_of
 from .motion import UNKNOWN as STILL_UNKNOWN
@@ -56,12 +57,18 @@ class Memory(NamedTuple):
     failsafe: Said | None = None
     """What it said of a failsafe that its state reports."""
     internal_errors_since: Instant | None = None
+    rc_lost_since: Instant | None = None
+    """When PX4's RC_RECEIVER bit turned unhealthy; without RC it is so for a whole flight."""
+    asked: Asked | None = None
+    """A command of somebody else to this vehicle that it has not acknowledged yet."""
     assumed_free: bool = False
     """`estop_assume_visible`: no e-stop was engaged when it was armed."""
     event: int | None = None
     """The sequence number of the latest EVENT."""
     boots: int = 0
     """Reboots seen."""
+    formerly: tuple[int, int] | None = None
+    """The autopilot and vehicle type that spoke with these ids before."""
 
     @property
     def stack(self) -> Stack:

@@ -25,6 +25,8 @@ class Motion(NamedTuple):
     """Since when above the upper thresholds."""
     slow_since: float | None = None
     """Since when below the lower thresholds."""
+    speed: float | None = None
+    """The latest sample, m/s; None while there is no estimate."""
 
 
 UNKNOWN: Final = Motion()
@@ -32,9 +34,9 @@ UNKNOWN: Final = Motion()
 
 def settle(motion: Motion, now: float) -> Motion:
     """The motion at `now` if no sample came since."""
-    if motion.fast_since is not None and now - motion.fast_since >= SUSTAIN_ON:
+    if motion.fast_since is not None and now >= motion.fast_since + SUSTAIN_ON:
         return motion if motion.value is TriState.TRUE else motion._replace(value=TriState.TRUE)
-    if motion.slow_since is not None and now - motion.slow_since >= SUSTAIN_OFF:
+    if motion.slow_since is not None and now >= motion.slow_since + SUSTAIN_OFF:
         return motion if motion.value is TriState.FALSE else motion._replace(value=TriState.FALSE)
     return motion
 
@@ -54,4 +56,5 @@ def moved(
         motion.value,
         (motion.fast_since if motion.fast_since is not None else now) if fast else None,
         (motion.slow_since if motion.slow_since is not None else now) if slow else None,
+        speed,
     )

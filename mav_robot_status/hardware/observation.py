@@ -9,6 +9,8 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 LONGEST_INTERVALS = 10.0  # seconds: three intervals of a slow stream count for at most this long
+SILENCE = 2.0
+"""Seconds after which the next message of its kind may make fresh again what had become too old."""
 REMEMBERED = 6  # arrivals, hence five intervals
 
 
@@ -19,22 +21,29 @@ class Heard(NamedTuple):
     at: float
     times: tuple[float, ...]
     """The last arrivals, this one included."""
+    since: float
+    """Since when it is heard without a SILENCE."""
 
 
 def heard(message: Any, at: float, before: Heard | None) -> Heard:
     """`message`, heard at `at` after `before`."""
     if before is None:
-        return Heard(message, at, (at,))
+        return Heard(message, at, (at,), at)
     times = before.times
-    return Heard(message, at, (*(times if len(times) < REMEMBERED else times[1:]), at))
+    times = (*(times if len(times) < REMEMBERED else times[1:]), at)
+    return Heard(message, at, times, at if at - before.at > SILENCE else before.since)
 
 
 def is_fresh(what: Heard | None, now: float, least: float) -> bool:
     """True while `what` is not older than `least` seconds, or than three measured intervals if that is longer."""
     if what is None:
         return False
-    age = now - what.at
-    return age <= least or (age <= LONGEST_INTERVALS and age <= 3 * interval(what))
+    return now <= what.at + least or now <= slowly_fresh_until(what)
+
+
+def slowly_fresh_until(what: Heard) -> float:
+    """Until when a slow stream's message counts: three of its intervals, at most LONGEST_INTERVALS."""
+    return what.at + min(3 * interval(what), LONGEST_INTERVALS)
 
 
 def interval(what: Heard) -> float:

@@ -127,16 +127,23 @@ def heard_beat(
     return watch._replace(stop=stop, candidate=())
 
 
+def is_vetoed(watch: Watch, family: Family, speed: float) -> bool:
+    """Whether `speed` (`hearing.movement.driving_speed`) says that something drives though the outputs are held.
+
+    A copter that is stopped falls, whatever it did before; a rover coasts.
+    """
+    return speed - (watch.speed_then if family is Family.ROVER else 0.0) > GROWTH
+
+
 def verdict(watch: Watch, family: Family, vehicle_type: int, speed: float, now: float) -> TriState:
     """TRUE held, FALSE driven, UNKNOWN neither (or not for long enough) at `now`."""
     if watch.driven:
         return TriState.FALSE
-    if watch.held_since is None or now - watch.held_since < HOLD:
+    if watch.held_since is None or now < watch.held_since + HOLD:
         return TriState.UNKNOWN
     if family not in HELD_FAMILIES or vehicle_type == HELICOPTER:
         return TriState.UNKNOWN
-    # a copter that is stopped falls, whatever it did before; a rover coasts
-    if speed - (watch.speed_then if family is Family.ROVER else 0.0) > GROWTH:
+    if is_vetoed(watch, family, speed):
         return TriState.UNKNOWN
     return TriState.TRUE
 

@@ -151,8 +151,7 @@ class Requests:
 
     def _look(self, now: float, wanted: tuple[Wanted, ...], ask_modes: bool) -> None:
         """Compare what came with what is wanted, and queue what is missing."""
-        seconds = max(now - self._window, LOOK)
-        missing = [w for w in self._missing(seconds, wanted) if w.id not in self._refused]
+        missing = [w for w in self._missing(wanted) if w.id not in self._refused]
         self._round += 1
         if self._round > ROUNDS:
             self._look_at = math.inf
@@ -172,13 +171,8 @@ class Requests:
         self._counts.clear()
         self._window, self._look_at = now + AGAIN - LOOK, now + AGAIN
 
-    def _missing(self, seconds: float, wanted: tuple[Wanted, ...]) -> Iterator[Wanted]:
+    def _missing(self, wanted: tuple[Wanted, ...]) -> Iterator[Wanted]:
         for w in wanted:
-            if (
-                max(self._rate(w.id, seconds), 0.0 if w.instead is None else self._rate(w.instead, seconds))
-                < w.rate / 2
-            ):
+            rate = max(self._counts.get(i, 0) for i in (w.id, w.instead) if i is not None) / LOOK
+            if rate < w.rate / 2:
                 yield w
-
-    def _rate(self, message_id: int, seconds: float) -> float:
-        return self._counts.get(message_id, 0) / seconds

@@ -22,14 +22,16 @@ from ..interface import (
 from ..mavlink import definitions as mav
 from ..mavlink.decode import decode
 from . import derive as rules
-from .hearing import HANDLERS, hear, pass_time
+from . import horizon
+from .hearing import HANDLERS, hear, overheard, pass_time
 from .identity import Stack, is_autopilot
 from .memory import begin
+from .observation import SILENCE
 from .options import HardwareOptions
 from .requests import Requests, wanted_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Container, Iterator, Sequence
 
     from ..clock import Instant
     from ..mavlink.framing import Frame
@@ -38,8 +40,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MOST_VEHICLES: Final = 256
-STEP: Final = 0.1  # s between looks at a vehicle whose status may change by time alone
-WANTED_IDS: Final = frozenset(d.id for d in mav.MESSAGES.values() if d.type in HANDLERS or d.type is mav.CommandAck)
+COMMAND_IDS: Final = frozenset({75, 76})  # COMMAND_INT, COMMAND_LONG: heard from others
+WANTED_IDS: Final = frozenset(d.id for d in mav.MESSAGES.values() if d.type in HANDLERS) | COMMAND_IDS
 
 
 class Slot(NamedTuple):
@@ -61,7 +63,7 @@ class Ask(NamedTuple):
 class Tracked:
     """One vehicle: its handle, and once it was heard its ids and memory."""
 
-    __slots__ = ("boots", "deadline", "dirty", "handle", "ids", "memory", "requests", "slot")
+    __slots__ = ("boots", "deadline", "dirty", "handle", "ids", "memory", "requests", "seen", "slot")
 
     def __init__(self, slot: Slot) -> None:
         self.slot = slot
@@ -71,7 +73,9 @@ class Tracked:
         self.memory: Memory | None = None
         self.requests: Requests | None = None
         self.boots = 0
-        self.dirty = False
+        self.seen: tuple[object, ...] = ()
+        """What mattered at the last look."""
+        self.dirty = True
         self.deadline = math.inf
 
     def matches(self, system: int, component: int) -> bool:
@@ -88,11 +92,15 @@ class MavlinkRobotHW(RobotHW):
         super().__init__()
         self.options = options or HardwareOptions()
         self.own_component = own_component
+        self.own_system: int | None = None
+        """The system id we speak under; None: that of the vehicle we speak to."""
         self.handles = IndustrialRobotStatusInterface()
         self.register_interface(self.handles)
         # a vehicle that is named exactly comes before one that is not
         ordered = sorted(slots, key=lambda slot: (slot.system is None, slot.component is None))
         self._expected = [Tracked(slot) for slot in ordered]
+        self._hasty = min(self.options.heartbeat_timeout, self.options.sys_status_timeout) < SILENCE
+        """Whether messages count as too old so soon that each one may change a status."""
         self._open = not slots
         """Whether every autopilot heard becomes a handle."""
         self._tracked: dict[tuple[int, int], Tracked] = {}
@@ -123,13 +131,16 @@ class MavlinkRobotHW(RobotHW):
                 return None
             self._hear(tracked, heartbeat, now)
             return tracked
+        if frame.message_id in COMMAND_IDS:
+            self._overhear(frame, now)
+            return None
         if tracked is None or tracked.memory is None:
             return None
         message = decode(frame)
         if tracked.requests is not None:
             tracked.requests.arrived(frame.message_id, now.mono)
             if type(message) is mav.CommandAck:
-                tracked.requests.acknowledged(message, (ids[0], self.own_component), now.mono)
+                tracked.requests.acknowledged(message, (self.own_system or ids[0], self.own_component), now.mono)
         self._hear(tracked, message, now)
         return None
 
@@ -139,12 +150,17 @@ class MavlinkRobotHW(RobotHW):
             if tracked.dirty or now.mono >= tracked.deadline:
                 self._evaluate(tracked, now)
 
-    def write(self, now: Instant) -> list[Ask]:
-        """What is to be asked of the autopilots at `now`. Not called on links where nothing may be sent."""
+    def explain(self, now: Instant) -> None:
+        """Bring the evidence in the handles up to `now`; `read` renews it only when a status may have changed."""
+        for tracked in self._tracked.values():
+            self._evaluate(tracked, now)
+
+    def write(self, now: Instant, passive: Container[tuple[int, int]] = ()) -> list[Ask]:
+        """What is to be asked of the autopilots at `now`; nothing of those on `passive` links."""
         asks = []
         for ids, tracked in self._tracked.items():
             memory = tracked.memory
-            if memory is None or tracked.handle.detail.link is not LinkState.CONNECTED:
+            if memory is None or ids in passive or tracked.handle.detail.link is not LinkState.CONNECTED:
                 continue
             if tracked.requests is None:
                 tracked.requests = Requests(*ids, now.mono)
@@ -167,12 +183,21 @@ class MavlinkRobotHW(RobotHW):
         """Begin anew, as if nothing had been heard (a new segment of a log). Handles keep their vehicles."""
         for tracked in self._tracked.values():
             tracked.memory = None
-            tracked.dirty, tracked.deadline = False, math.inf
+            tracked.boots = 0
+            tracked.dirty, tracked.deadline = True, math.inf
             system, component = tracked.ids or (None, None)
             tracked.handle.status = RobotStatus()
             tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)
             tracked.handle.heard_at = None
             tracked.handle.evidence = {}
+
+    def _overhear(self, frame: Frame, now: Instant) -> None:
+        """A command of a ground station to one of the vehicles."""
+        message = decode(frame)
+        for (system, component), tracked in self._tracked.items():
+            addressed = message.target_system == system and message.target_component in (0, component)
+            if addressed and tracked.memory is not None:
+                tracked.memory = overheard(tracked.memory, message, (frame.system, frame.component), now)
 
     def _discover(self, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant) -> Tracked | None:
         """The place of an autopilot that is heard for the first time."""
@@ -197,7 +222,8 @@ class MavlinkRobotHW(RobotHW):
             tracked.memory = begin(message, now)
         else:
             tracked.memory = hear(tracked.memory, message, now, self.options)
-        tracked.dirty = True
+        if not tracked.dirty:
+            tracked.dirty = self._hasty or horizon.matters(tracked.memory) != tracked.seen
         if type(message) is mav.Heartbeat:
             tracked.handle.heard_at = now.mono
         if tracked.memory.boots != tracked.boots:
@@ -219,12 +245,9 @@ class MavlinkRobotHW(RobotHW):
             handle.detail = derived.detail
         handle.evidence = derived.evidence
         tracked.dirty = False
-        if derived.detail.link is LinkState.LOST:
-            tracked.deadline = math.inf
-        else:
-            beat = memory.observation.heartbeat
-            lost_at = math.nextafter((beat.at if beat else now.mono) + self.options.heartbeat_timeout, math.inf)
-            tracked.deadline = max(min(lost_at, now.mono + STEP), math.nextafter(now.mono, math.inf))
+        tracked.seen = horizon.matters(memory)
+        lost = derived.detail.link is LinkState.LOST
+        tracked.deadline = math.inf if lost else horizon.next_change(memory, now.mono, self.options)
 
     def _log_link(self, tracked: Tracked, state: LinkState) -> None:
         before = tracked.handle.detail.link
@@ -233,6 +256,3 @@ class MavlinkRobotHW(RobotHW):
             log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, self.options.heartbeat_timeout)
         elif state is LinkState.CONNECTED and before is LinkState.LOST:
             log.info("vehicle %d.%d is back", *ids)
-            if tracked.requests is not None:
-                beat = tracked.handle.heard_at
-                tracked.requests.restart(beat if beat is not None else 0.0)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 GPS: Final = 1 << 5
 MOTOR_OUTPUTS: Final = 1 << 15
+RC_RECEIVER: Final = 1 << 16
 GEOFENCE: Final = 1 << 20
 AHRS: Final = 1 << 21
 PREARM_CHECK: Final = 1 << 28
@@ -113,7 +114,7 @@ def standing(faults: Faults, stack: Stack, armed: bool, now: float) -> list[tupl
         weight = HARD if bit - 32 in EXTENDED_BITS else weights.get(bit)
         if weight is None or (weight is SOFT and not armed):
             continue
-        if fault.messages >= DEBOUNCE_MESSAGES or now - fault.since.mono >= DEBOUNCE_SECONDS:
+        if fault.messages >= DEBOUNCE_MESSAGES or now >= fault.since.mono + DEBOUNCE_SECONDS:
             out.append((bit, weight, fault))
     return out
 

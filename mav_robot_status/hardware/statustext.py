@@ -82,10 +82,10 @@ def heard_chunk(assembly: Assembly, message: Statustext, now: Instant) -> tuple[
 
 def overdue(assembly: Assembly, now: float) -> tuple[Assembly, list[Text]]:
     """The unfinished texts at `now`, and those that have waited long enough, as they are."""
-    waiting = tuple((n, p) for n, p in assembly if now - p.at < PATIENCE)
+    waiting = tuple((n, p) for n, p in assembly if now < p.at + PATIENCE)
     if len(waiting) == len(assembly):
         return assembly, []
-    return waiting, _texts([t for _, p in assembly if now - p.at >= PATIENCE for t in _as_it_is(p)])
+    return waiting, _texts([t for _, p in assembly if now >= p.at + PATIENCE for t in _as_it_is(p)])
 
 
 def _as_it_is(partial: Partial) -> list[Text]:

@@ -25,8 +25,8 @@ LONELY_SYSTEM: Final = 245
 ONBOARD_CONTROLLER, INVALID = 18, 8  # MAV_TYPE, MAV_AUTOPILOT
 ACTIVE, CRITICAL = 4, 5  # MAV_STATE
 MAVLINK_VERSION: Final = 3
-REMEMBERED: Final = 16
-"""Frames of ours that are known again if a router sends them back."""
+REMEMBERED: Final = 8
+"""Heartbeats of ours, for each system, that are known again if a router sends them back."""
 
 
 class Component:
@@ -35,8 +35,11 @@ class Component:
     def __init__(self, component: int = COMPONENTS[0], system: int | None = None) -> None:
         self.id = component
         self._system = system
+        self._ids = (component, *(c for c in COMPONENTS if c != component))
+        self._others: set[tuple[int, int]] = set()
+        """Systems and components of `_ids` that other programs speak as: at most 255 times 5."""
         self._encoders: dict[int, Encoder] = {}
-        self._sent: deque[tuple[int, int, bytes]] = deque(maxlen=REMEMBERED)
+        self._sent: dict[int, deque[tuple[int, int, bytes]]] = {}
 
     def system_for(self, vehicle: int) -> int:
         """Our system id when we speak about this vehicle."""
@@ -46,12 +49,16 @@ class Component:
         """The next frame with `message` about the vehicle with this system id."""
         system = self.system_for(vehicle)
         encoder = self._encoders.get(system)
-        if encoder is None or encoder.component != self.id:
+        if encoder is None:
+            encoder = self._encoders[system] = Encoder(system, self.id)
+            self._step_aside(system)
+        if encoder.component != self.id:
             encoder = self._encoders[system] = Encoder(system, self.id)
         sequence = encoder.sequence
         frame = encoder.frame(message)
         if type(message) is Heartbeat:
-            self._sent.append((system, sequence, frame[10:-2]))
+            sent = self._sent.setdefault(system, deque(maxlen=REMEMBERED))
+            sent.append((self.id, sequence, frame[10:-2]))
         return frame
 
     def heartbeat(self, vehicle: int, in_error: bool = False) -> bytes:
@@ -60,12 +67,23 @@ class Component:
         return self.frame(Heartbeat(0, ONBOARD_CONTROLLER, INVALID, 0, state, MAVLINK_VERSION), vehicle)
 
     def heard(self, frame: Frame) -> None:
-        """Look at a HEARTBEAT: if another program speaks as we do, step aside to the next component id."""
-        if frame.component != self.id or frame.system not in self._encoders:
+        """Look at a HEARTBEAT: if another program speaks as we do, or as we could, keep out of its way."""
+        if frame.component not in self._ids:
             return
-        if (frame.system, frame.sequence, frame.payload) in self._sent:
+        if (frame.component, frame.sequence, frame.payload) in self._sent.get(frame.system, ()):
             return  # our own, come back through a router
-        after = COMPONENTS.index(self.id) + 1 if self.id in COMPONENTS else 0
-        taken = self.id
-        self.id = COMPONENTS[after % len(COMPONENTS)]
-        log.warning("another program speaks as %d/%d: taking component %d", frame.system, taken, self.id)
+        if (frame.system, frame.component) not in self._others:
+            self._others.add((frame.system, frame.component))
+            self._step_aside(frame.system)
+
+    def _step_aside(self, system: int) -> None:
+        """Take another component if ours is taken in a system that we speak for. Each is left only once."""
+        if system not in self._encoders or (system, self.id) not in self._others:
+            return
+        taken = {component for s, component in self._others if s in self._encoders}
+        free = next((c for c in self._ids if c not in taken), None)
+        if free is None:
+            log.warning("other programs speak as %s in system %d: staying %d", self._ids, system, self.id)
+            return
+        log.warning("another program speaks as %d/%d: taking component %d", system, self.id, free)
+        self.id = free

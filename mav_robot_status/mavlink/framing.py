@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from binascii import crc_hqx
 from dataclasses import dataclass, field
+from functools import lru_cache
 from struct import Struct
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -55,6 +56,8 @@ class Frame(NamedTuple):
     """The 13 bytes of MAVLink 2's signature block (link id, timestamp, signature), not verified; b"" if unsigned."""
     version: int
     """1 or 2."""
+    stamp: bytes = b""
+    """What stands before the frame where frames are stamped (a recorded log), else b""."""
 
 
 @dataclass(slots=True)
@@ -98,25 +101,39 @@ def count(table: dict[int, int], message_id: int, number: int = 1) -> None:
     table[message_id] = table.get(message_id, 0) + number
 
 
+@lru_cache(maxsize=8)
+def known_ids(wanted: frozenset[int]) -> dict[bytes | int, tuple[bytes, int, bool]]:
+    """Mirrored CRC_EXTRA, id, whether it is wanted; by the id as it stands in the frame (MAVLink 2: three bytes)."""
+    known: dict[bytes | int, tuple[bytes, int, bool]] = {}
+    for message_id, crc_extra in CRC_EXTRA.items():
+        entry = MIRROR[crc_extra : crc_extra + 1], message_id, message_id in wanted
+        known[message_id.to_bytes(3, "little")] = known[message_id] = entry
+    return known
+
+
 class Parser:
     """Finds the frames in the bytes of one link or log; they may be cut anywhere from feed to feed.
 
     `wanted` are the message ids that `feed` returns; frames of other ids are checked and counted, no more.
+    `stamp_size` bytes stand before each frame (8 in a recorded log) that are no MAVLink and are handed on with it.
     """
 
-    __slots__ = ("_expected", "_in_step", "_lookup", "_tail", "counters")
+    __slots__ = ("_expected", "_in_step", "_lookup", "_stamp_size", "_tail", "counters", "last_stamp")
 
-    def __init__(self, wanted: Collection[int]) -> None:
+    def __init__(self, wanted: Collection[int], stamp_size: int = 0) -> None:
         self.counters = Counters()
+        self._stamp_size = stamp_size
+        self.last_stamp = b""
+        """The stamp of the last good frame, wanted or not, where frames are stamped."""
         self._tail = b""
         self._in_step = True
         self._expected: dict[bytes, int] = {}  # (system, component) -> sequence number of the next frame
-        # keyed by the id as it stands in the frame: three bytes in MAVLink 2, a number in MAVLink 1
-        known: dict[bytes | int, tuple[bytes, int, bool]] = {}
-        for message_id, crc_extra in CRC_EXTRA.items():
-            entry = MIRROR[crc_extra : crc_extra + 1], message_id, message_id in wanted
-            known[message_id.to_bytes(3, "little")] = known[message_id] = entry
-        self._lookup = known.get
+        self._lookup = known_ids(frozenset(wanted)).get
+
+    @property
+    def pending(self) -> int:
+        """Bytes kept of a cut frame."""
+        return len(self._tail)
 
     def reset(self) -> None:
         """Drop what is left of a cut frame: what comes next does not continue it (a new segment of a log)."""
@@ -138,11 +155,12 @@ class Parser:
         expected = self._expected
         frames: list[Frame] = []
         good = 0
-        i = 0
+        stamped = i = self._stamp_size
+        before = -1
         if not self._in_step:
-            i = self._hunt(data, mirrored, 0)
+            i = self._hunt(data, mirrored, min(stamped, size))
             if not self._in_step:
-                self._tail = data[i:]
+                self._tail = data[max(0, i - stamped) :]
                 return frames
         while i < size:
             magic = data[i]
@@ -175,7 +193,7 @@ class Parser:
                 if self._in_step and i > doubtful:
                     continue
                 break
-            i = following
+            before, i = i, following + stamped
             if expected.get(source) == sequence:
                 expected[source] = (sequence + 1) & 255
             else:
@@ -193,11 +211,11 @@ class Parser:
                 payload = data[start:end]
                 signature = data[end + 2 : following]
                 version = 1 if flags == OLD else 2
-                frames.append(Frame(entry[1], source[0], source[1], sequence, payload, signature, version))
-        if i < size:
-            self._tail = data[i:]
-        elif self._tail:
-            self._tail = b""
+                stamp = data[before - stamped : before]
+                frames.append(Frame(entry[1], source[0], source[1], sequence, payload, signature, version, stamp))
+        self._tail = data[i - stamped :]
+        if stamped and before >= 0:
+            self.last_stamp = data[before - stamped : before]
         self.counters.frames += good
         return frames
 
@@ -227,7 +245,8 @@ class Parser:
         else:
             message_id, sequence, source = data[i + 5], data[i + 2], data[i + 3 : i + 5]
         bad = message_id in CRC_EXTRA
-        at_end = following == len(data)
+        following += self._stamp_size
+        at_end = following >= len(data)
         inside, open_inside = self._find(data, mirrored, i + 1, following) if bad or at_end else (-1, -1)
         if bad and inside >= 0:
             count(self.counters.bad_crc, message_id)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import select
-import sys
 from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import rfc3339
@@ -22,6 +22,7 @@ PIPE_BUF: Final = 4096
 """Bytes that a pipe which poll() calls writable takes without blocking (PIPE_BUF of Linux)."""
 CHUNK: Final = 1 << 16  # bytes written at once on replay
 RETRY: Final = 0.005  # s until a full pipe is tried again
+LOOK: Final = 1.0  # s between looks whether the reader is still there, while there is nothing to write
 WORDS: Final = {-1: None, 0: False, 1: True}
 
 
@@ -81,7 +82,8 @@ class JsonLinesPublisher:
     """Writes lines to a file, or to standard output. A reader that is too slow loses lines, never the gateway time.
 
     Options: `path` (a file to append to; `-`, the default, is standard output), `format` (native, ros1, ros2),
-    `changes_only` (no periodic lines). Raises BrokenPipeError once the reader has gone.
+    `changes_only` (no periodic lines). Raises BrokenPipeError once the reader has gone, LinkError if nothing can be
+    written for another reason (a full disk).
     """
 
     def __init__(self, context: PublisherContext) -> None:
@@ -102,7 +104,9 @@ class JsonLinesPublisher:
             except OSError as error:
                 raise LinkError(f"cannot write JSON lines to {path}: {error.strerror}") from None
             self._owned = True
+        self._path = "standard output" if path == "-" else path
         self._patient = context.patient
+        self._look_at = -math.inf
         self._waiting = 0
         self._lines: list[bytes] = []
         self._poll = select.poll()
@@ -128,18 +132,24 @@ class JsonLinesPublisher:
             self._write()
 
     def service(self, now: Instant) -> float | None:
-        """Write the rest of a long line."""
+        """Write the rest of a long line; notice that the reader has gone although there is nothing to write."""
         if self._rest:
             self._write()
+        elif now.mono >= self._look_at and not self._patient:
+            self._look_at = now.mono + LOOK
+            self._writable()
         return now.mono + RETRY if self._rest else None
 
     def close(self) -> None:
         """Write the rest of a line if the reader takes it, and close a file of our own."""
-        if self._rest:
-            self._write()
-        self._flush()
-        if self._owned:
-            os.close(self._fd)
+        try:
+            if self._rest:
+                self._write()
+            self._flush()
+        finally:
+            if self._owned:
+                self._owned = False
+                os.close(self._fd)
 
     def _body(self, msg: RobotStatusMsg) -> str:
         cached = self._bodies.get(msg.handle)
@@ -169,23 +179,26 @@ class JsonLinesPublisher:
         self._lines.clear()
         self._waiting = 0
         while data:
-            try:
-                data = data[os.write(self._fd, data) :]
-            except BlockingIOError:
+            done = self._put(data)
+            data = data[done:]
+            if not done:
                 self._poll.poll()
 
     def _write(self) -> None:
         """Write while the reader takes it, never more at once than cannot block."""
         while self._rest and self._writable():
-            try:
-                done = os.write(self._fd, self._rest[:PIPE_BUF])
-            except BlockingIOError:
-                return
+            done = self._put(self._rest[:PIPE_BUF])
             self._rest = self._rest[done:]
+            if not done:
+                return
 
-
-def stdout_is_closed() -> None:
-    """Keep the interpreter from complaining, when it ends, about a standard output that was closed by its reader."""
-    devnull = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(devnull, sys.stdout.fileno())
-    os.close(devnull)
+    def _put(self, data: bytes | memoryview) -> int:
+        """The bytes that were written; 0 if there is no room now."""
+        try:
+            return os.write(self._fd, data)
+        except BlockingIOError:
+            return 0
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise LinkError(f"cannot write JSON lines to {self._path}: {error.strerror}") from None

@@ -9,6 +9,7 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING, Final
 
+from ..interface import LinkState
 from ..mavlink.definitions import RobotStatus as RobotStatusMessage
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class _Subject:
 
 
 class MavlinkPublisher:
-    """Sends ROBOT_STATUS. A vehicle whose system id is not known yet has nobody to be spoken for, and is left out."""
+    """Sends ROBOT_STATUS. About a vehicle that was never heard nothing is said."""
 
     periodic = True
 
@@ -76,7 +77,7 @@ class MavlinkPublisher:
         again = math.inf
         for subject in self._subjects.values():
             msg = subject.waiting
-            if msg is None or msg.detail.system is None:
+            if msg is None or msg.detail.system is None or msg.detail.link is LinkState.NEVER_SEEN:
                 continue
             content = (msg.status, msg.detail)
             periodic = now.mono - subject.last >= INTERVAL - SLACK
@@ -91,7 +92,9 @@ class MavlinkPublisher:
             if not periodic:
                 subject.changes.append(now.mono)
             else:
-                subject.last = now.mono
+                # the phase is kept, or jitter would add up and thin 1 Hz further
+                late = now.mono - subject.last >= 2 * INTERVAL
+                subject.last = now.mono if late else subject.last + INTERVAL
             subject.sent, subject.waiting = content, None
             self._port.send(message_of(msg), msg.detail.system)
         return None if again == math.inf else again

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 from ...clock import Instant
 from ...mavlink import definitions as mav
 from ..memory import Memory
-from . import beats, modes, movement, sensing, words
+from . import beats, commanded, modes, movement, sensing, words
+from .commanded import overheard
 from .words import pass_time
 
 if TYPE_CHECKING:
     from ..options import HardwareOptions
 
-__all__ = ["HANDLERS", "hear", "pass_time"]
+__all__ = ["HANDLERS", "hear", "overheard", "pass_time"]
 
 Handler = Callable[[Memory, Any, Instant, "HardwareOptions"], Memory]
 
@@ -36,6 +37,7 @@ HANDLERS: Final[dict[type, Handler]] = {
     mav.EscTelemetry5To8: movement.esc_telemetry,
     mav.EscTelemetry9To12: movement.esc_telemetry,
     mav.EscStatus: movement.esc_status,
+    mav.CommandAck: commanded.command_ack,
     mav.CurrentMode: modes.current_mode,
     mav.AvailableModes: modes.available_modes,
 }

@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 
 LONG_LOSS: Final = 30.0
 """Seconds of link loss after which nothing that was latched is believed."""
+TURN: Final = 10.0
+"""Seconds within which two autopilots with the same ids take turns."""
 UNINIT, BOOT, STANDBY = 0, 1, 3  # MAV_STATE
 
 
 def heartbeat(memory: Memory, message: Heartbeat, now: Instant, options: HardwareOptions) -> Memory:
     """A HEARTBEAT: edges of armed and state, stop values, and whether the autopilot has started anew."""
     if (message.autopilot, message.type) != (memory.autopilot, memory.vehicle_type):
-        return begin(message, now)  # another autopilot: nothing that was said of the old one counts
+        return _another(memory, message, now)
     last = memory.pulse.runs[-1].last
     memory = pass_time(memory, now, options)
     before = memory.pulse
@@ -55,6 +57,16 @@ def heartbeat(memory: Memory, message: Heartbeat, now: Instant, options: Hardwar
     return memory._replace(failsafe=None) if pulse.calm_since == now.mono else memory
 
 
+def _another(memory: Memory, message: Heartbeat, now: Instant) -> Memory:
+    """Another autopilot: nothing that was said of the old one counts. Two that take turns claim the same ids."""
+    new = begin(message, now)._replace(boots=memory.boots, formerly=(memory.autopilot, memory.vehicle_type))
+    in_turn = memory.formerly == (message.autopilot, message.type) and now.mono - memory.pulse.since.mono <= TURN
+    if not in_turn:
+        return new
+    kept = {code: latch for code, latch in memory.latches.items() if code == 9002}
+    return new._replace(latches=causes.announce(kept, 9002, None, now, "HEARTBEAT.type and autopilot"))
+
+
 def _starts_anew(previous: Heartbeat, message: Heartbeat, memory: Memory) -> bool:
     """The heartbeat says that the autopilot is starting, and the one before said that it had."""
     state, before = message.system_status, previous.system_status
@@ -70,7 +82,7 @@ def rebooted(memory: Memory, boot: boot_rules.Boot, now: Instant) -> Memory:
     """After a reboot nothing that the old run said counts; one while armed is an error."""
     latches: causes.Latches = {}
     if 5004 in memory.latches or armed_before(memory.pulse, boot.at, LONG_LOSS):
-        latches = causes.announce(latches, 5004, None, now)
+        latches = causes.announce(latches, 5004, None, now, "time_boot_ms")
     observation = memory.observation
     status = observation.sys_status
     return memory._replace(
@@ -89,6 +101,7 @@ def rebooted(memory: Memory, boot: boot_rules.Boot, now: Instant) -> Memory:
         not_ready=None,
         failsafe=None,
         internal_errors_since=None,
+        rc_lost_since=None,
         assumed_free=False,
         event=None,
         boots=memory.boots + 1,

@@ -34,8 +34,9 @@ def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant
     """GLOBAL_POSITION_INT: the first choice for speed."""
     memory = _clock(memory, message.time_boot_ms, now)
     memory = observed(memory, global_position=heard(message, now.mono, memory.observation.global_position))
+    velocity = message.vx / 100, message.vy / 100, message.vz / 100
     nowhere = message.lat == 0 and message.lon == 0
-    return _moved(memory, _speed(memory, message.vx / 100, message.vy / 100, message.vz / 100, nowhere), now, options)
+    return _moved(memory, _speed(memory, velocity, not any(velocity), nowhere), now, options)
 
 
 def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> Memory:
@@ -44,7 +45,8 @@ def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, 
     memory = observed(memory, local_position=heard(message, now.mono, memory.observation.local_position))
     if is_fresh(memory.observation.global_position, now.mono, motion.FRESH):
         return memory
-    return _moved(memory, _speed(memory, message.vx, message.vy, message.vz, False), now, options)
+    velocity = message.vx, message.vy, message.vz
+    return _moved(memory, _speed(memory, velocity, not any(velocity)), now, options)
 
 
 def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> Memory:
@@ -55,8 +57,8 @@ def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: Hardware
         observation.local_position, now.mono, motion.FRESH
     ):
         return memory
-    climb = 0.0 if message.groundspeed == 0 else message.climb  # a ground speed of exactly 0 alone is no estimate
-    return _moved(memory, _speed(memory, message.groundspeed, 0.0, climb, False), now, options)
+    still = message.groundspeed == 0  # whatever the climb, which comes from the barometer
+    return _moved(memory, _speed(memory, (message.groundspeed, 0.0, message.climb), still), now, options)
 
 
 def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> Memory:
@@ -85,16 +87,15 @@ def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> Memory:
     return rebooted(memory, boot, now) if anew else memory._replace(boot=boot)
 
 
-def _speed(memory: Memory, north: float, east: float, down: float, nowhere: bool) -> float | None:
-    """Speed in m/s, None where the numbers mean that there is no estimate.
+def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, nowhere: bool = False) -> float | None:
+    """Speed in m/s, None where the numbers mean that there is no estimate: `still` exactly zero, `nowhere` at 0, 0.
 
     ArduPilot sends exactly zero (and its last position) when it has none, and up to 6 m/s at rest while its estimator
     is unhealthy; INAV sends zero without GPS.
     """
-    if not (math.isfinite(north) and math.isfinite(east) and math.isfinite(down)):
+    if not all(map(math.isfinite, velocity)):
         return None
     status = memory.observation.sys_status
-    still = north == 0 and east == 0 and down == 0
     if memory.stack is Stack.ARDUPILOT:
         if still and (nowhere or status is None or not sensors.estimate_is_healthy(status.message)):
             return None
@@ -102,7 +103,7 @@ def _speed(memory: Memory, north: float, east: float, down: float, nowhere: bool
             return None
     elif memory.stack is Stack.INAV and still and not _has_gps(status):
         return None
-    return math.hypot(north, east) if memory.family is Family.ROVER else math.hypot(north, east, down)
+    return math.hypot(*velocity[:2]) if memory.family is Family.ROVER else math.hypot(*velocity)
 
 
 def _has_gps(status: Heard | None) -> bool:

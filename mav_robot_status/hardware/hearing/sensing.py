@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ...mavlink.definitions import SysStatus
 from .. import causes, estop, sensors
 from ..identity import Stack
-from ..observation import heard
+from ..observation import Heard, heard
 
 if TYPE_CHECKING:
     from ...clock import Instant
@@ -42,6 +42,7 @@ def sys_status(memory: Memory, message: SysStatus, now: Instant, options: Hardwa
         stop=stop,
         latches=latches,
         not_ready=None if ready else memory.not_ready,
+        rc_lost_since=_rc_lost_since(memory, before, message, now),
         internal_errors_since=(memory.internal_errors_since or now) if counted else None,
     )
 
@@ -49,3 +50,16 @@ def sys_status(memory: Memory, message: SysStatus, now: Instant, options: Hardwa
 def _fence_is_kept(status: SysStatus) -> bool:
     enabled = status.onboard_control_sensors_present & status.onboard_control_sensors_enabled
     return bool(enabled & status.onboard_control_sensors_health & sensors.GEOFENCE)
+
+
+def _rc_lost_since(memory: Memory, before: Heard | None, status: SysStatus, now: Instant) -> Instant | None:
+    """Since when PX4 has lost a receiver that it had."""
+    if memory.stack is not Stack.PX4 or not _is_faulty(status, sensors.RC_RECEIVER):
+        return None
+    if before is None or _is_faulty(before.message, sensors.RC_RECEIVER):
+        return memory.rc_lost_since
+    return now
+
+
+def _is_faulty(status: SysStatus, bit: int) -> bool:
+    return bool(status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health & bit)

@@ -103,5 +103,5 @@ def event(memory: Memory, message: Event, now: Instant, options: HardwareOptions
     memory = memory._replace(event=message.sequence)
     external, internal = message.log_levels & 0x0F, message.log_levels >> 4
     if memory.stack is Stack.PX4 and memory.pulse.armed and external <= UNCLASSIFIED and internal <= 5:
-        return memory._replace(latches=causes.announce(memory.latches, 7000 + external, None, now))
+        return memory._replace(latches=causes.announce(memory.latches, 7000 + external, None, now, "EVENT"))
     return memory

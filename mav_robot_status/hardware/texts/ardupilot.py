@@ -60,10 +60,8 @@ RULES: Final = table(
         (r"Internal Errors 0x", CAUSE, (5001,)),
         (r"Config Error: ", CAUSE, (5002,)),
         (r"WDG: T", CAUSE, (5003,)),
-        # chatter of good flights, some of it at severity 1 or 2
+        # chatter
         (r"(Disa|A)rming motors|Throttle (dis)?armed", IGNORE),
         (r"Flight mode change failed|No such mode|Mode change to ", IGNORE),
-        (r"Initialising APM|GROUND START|Calibrating |Calibration |command received|Place vehicle", IGNORE),
-        (r"ODOMETRY: |Not enough bandwidth|System does not support", IGNORE),
     ]
 )

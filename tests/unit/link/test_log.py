@@ -1,48 +1,16 @@
 import itertools
-import os
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_robot_status.errors import UsageError
-from mav_robot_status.link.log import DAY_US, END, SMALL_STEP_US, Counts, LogReader, follows, timed
+from mav_robot_status.link.log import BLOCK, DAY_US, END, SMALL_STEP_US, Counts, LogReader, follows, stamp_of, timed
 
 START = 1_700_000_000_000_000
 SECOND = 1_000_000
-
-
-def v1(number: int = 0) -> bytes:
-    return bytes([0xFE, 9, number, 1, 1, 0]) + bytes(9) + b"\x12\x34"
-
-
-def v2(number: int = 0, signed: bool = False) -> bytes:
-    return bytes([0xFD, 9, int(signed), 0, number, 1, 1, 0, 0, 0]) + bytes(9) + b"\x12\x34" + bytes(13 * signed)
-
-
-def record(stamp: int, data: bytes) -> bytes:
-    return stamp.to_bytes(8, "big") + data
-
-
-def ordinary(count: int = 10, start: int = START) -> list[bytes]:
-    frames = [v1, v2, lambda number: v2(number, signed=True)]
-    return [record(start + number * SECOND, frames[number % 3](number)) for number in range(count)]
-
-
-Write = Callable[..., LogReader]
-
-
-@pytest.fixture(name="reader")
-def fixture_reader(tmp_path: Path) -> Write:
-    def write(*parts: bytes) -> LogReader:
-        path = tmp_path / "flight.tlog"
-        path.write_bytes(b"".join(parts))
-        return LogReader(str(path))
-
-    return write
 
 
 def times(stamps: list[float]) -> tuple[list[tuple[float, float, bool]], Counts]:
@@ -56,92 +24,18 @@ def times(stamps: list[float]) -> tuple[list[tuple[float, float, bool]], Counts]
     ], counts
 
 
-def test_a_log_in_order_gives_each_frame_at_its_time(reader: Write) -> None:
-    log = reader(*ordinary())
-    records = list(log)
-    assert [r.data for r in records] == [part[8:] for part in ordinary()]
-    assert [r.now.unix_us for r in records] == [START + n * SECOND for n in range(10)]
-    assert [r.now.mono for r in records] == pytest.approx(range(10))
-    assert not any(r.new_segment for r in records)
-    assert log.counts == Counts(records=10)
-    assert log.summary() == f"{log.path}: 10 records"
+def test_a_reader_gives_the_whole_file_in_blocks(tmp_path: Path) -> None:
+    content = bytes(range(256)) * 1024
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(content)
+    blocks = list(LogReader(str(path)).blocks())
+    assert b"".join(blocks) == content
+    assert {len(block) for block in blocks} == {BLOCK}
 
 
-def test_reading_again_gives_the_same(reader: Write) -> None:
-    log = reader(*ordinary(), b"torn")
-    assert list(log) == list(log)
-    assert log.counts.torn_bytes == 4
-
-
-@pytest.mark.parametrize("size", [1, 7, 8, 9, 18, 19, 24])
-def test_a_torn_tail_is_counted(reader: Write, size: int) -> None:
-    tail = record(START + 60 * SECOND, v1())[:size]
-    log = reader(*ordinary(), tail)
-    assert [r.data for r in log] == [part[8:] for part in ordinary()]
-    assert log.counts == Counts(records=10, torn_bytes=size)
-    assert log.summary().endswith(f": 10 records, {size} bytes of a torn record at the end")
-
-
-def test_garbage_that_was_recorded_as_a_record_is_handed_on_at_its_time(reader: Write) -> None:
-    parts = ordinary()
-    text = [record(START + 4 * SECOND + n, bytes([letter])) for n, letter in enumerate(b"Init ArduPilot\n")]
-    log = reader(*parts[:5], *text, *parts[5:])
-    assert [r.data for r in log] == [part[8:] for part in (*parts[:5], *text, *parts[5:])]
-    assert log.counts == Counts(records=25, garbage_bytes=15)
-
-
-def test_garbage_behind_a_frame_stays_with_it(reader: Write) -> None:
-    parts = ordinary()
-    log = reader(*parts[:5], b"garbage \xfd\xfe" * 3, *parts[5:])
-    data = [r.data for r in log]
-    assert data[4] == parts[4][8:] + b"garbage \xfd\xfe" * 3
-    assert [data[:4], data[5:]] == [[part[8:] for part in parts[:4]], [part[8:] for part in parts[5:]]]
-    assert log.counts == Counts(records=10, garbage_bytes=30)
-
-
-@pytest.mark.parametrize("length", [0, 3, 12, 60, 255])
-def test_a_wrong_length_costs_no_other_frame(reader: Write, length: int) -> None:
-    parts = ordinary()
-    damaged = bytearray(parts[4])
-    damaged[9] = length
-    log = reader(*parts[:4], bytes(damaged), *parts[5:])
-    data = [r.data for r in log]
-    assert data == [part[8:] for part in (*parts[:4], bytes(damaged), *parts[5:])]
-
-
-def test_bytes_that_are_missing_cost_one_frame(reader: Write) -> None:
-    parts = ordinary()
-    log = reader(*parts[:4], parts[4][:20], *parts[5:])
-    data = [r.data for r in log]
-    assert [data[:4], data[-5:]] == [[part[8:] for part in parts[:4]], [part[8:] for part in parts[5:]]]
-
-
-def test_what_comes_before_the_first_record_is_skipped(reader: Write) -> None:
-    log = reader(b"\x00\x06 some header \xfe\xfd", *ordinary())
-    assert [r.data for r in log] == [part[8:] for part in ordinary()]
-    assert log.counts == Counts(records=10, skipped_bytes=17)
-
-
-def test_a_jump_of_the_clock_behind_garbage_is_found(reader: Write) -> None:
-    log = reader(*ordinary(), b"garbage", *ordinary(start=START + 400 * DAY_US))
-    records = list(log)
-    assert len(records) == 20
-    assert [n for n, r in enumerate(records) if r.new_segment] == [10]
-    assert log.counts == Counts(records=20, garbage_bytes=7, jumps=1)
-    assert log.summary().endswith("7 bytes of garbage, 1 jumps of the clock, each a new segment")
-
-
-@pytest.mark.parametrize(
-    "stamp", [0, START - 3600 * SECOND, START + 3600 * SECOND, START + 900 * DAY_US, 1 << 52, (1 << 64) - 1]
-)
-def test_a_single_wrong_stamp_counts_as_the_one_before(reader: Write, stamp: int) -> None:
-    parts = ordinary()
-    log = reader(*parts[:4], record(stamp, v1(4)), *parts[5:])
-    records = list(log)
-    assert [(r.now.unix_us - START) // SECOND for r in records] == [0, 1, 2, 3, 3, 5, 6, 7, 8, 9]
-    assert [r.now.mono for r in records] == pytest.approx([0, 1, 2, 3, 3, 5, 6, 7, 8, 9])
-    assert records[4].data == v1(4)
-    assert log.counts == Counts(records=10, corrected=1)
+def test_a_stamp_is_what_stands_before_a_frame() -> None:
+    assert stamp_of(START.to_bytes(8, "big"), 7) == START
+    assert stamp_of(b"", 7) == 7
 
 
 def test_a_small_step_back_is_held_until_the_log_catches_up() -> None:
@@ -212,31 +106,11 @@ def test_neighbours_are_five_seconds_back_to_a_day_forward() -> None:
     assert not follows(START, END)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.lists(
-        st.one_of(
-            st.binary(max_size=40),
-            st.integers(0, 9).map(lambda n: ordinary()[n]),
-            st.integers(0, (1 << 64) - 1).map(lambda stamp: record(stamp, v2())),
-            st.just(bytes(30)),
-        )
-    )
-)
-def test_every_byte_of_any_log_is_in_order_and_accounted_for(reader: Write, parts: list[bytes]) -> None:
-    log = reader(*ordinary(3), *parts)
-    records = list(log)
-    stamps = 8 * len(records)
-    assert log.counts.records == len(records)
-    assert sum(len(r.data) for r in records) + stamps + log.counts.torn_bytes == os.path.getsize(log.path)
-
-
 @pytest.mark.parametrize(
     ("content", "part"),
     [
         (None, "cannot read the log '{}': No such file or directory"),
         (b"", "the log '{}' is empty"),
-        (b"\xa3\x95" * 1000, "{} is not a recorded log: no MAVLink frame with a time stamp in it; a .tlog is needed"),
     ],
 )
 def test_a_file_that_is_no_log_is_said_in_one_line(tmp_path: Path, content: bytes | None, part: str) -> None:

@@ -59,7 +59,7 @@ def test_a_short_mavlink_1_payload_without_extensions_is_filled_up() -> None:
 
 
 def test_a_message_that_is_not_used_is_none() -> None:
-    assert decode(Frame(24, 1, 1, 0, bytes(30), b"", 2)) is None
+    assert decode(Frame(46, 1, 1, 0, bytes(2), b"", 2)) is None
 
 
 @pytest.mark.parametrize(

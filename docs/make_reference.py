@@ -1,0 +1,165 @@
+"""Writes `docs/reference.md` from the tables in the code: `python docs/make_reference.py [OUTPUT_FILE]`.
+
+`tests/docs/test_reference.py` runs this and compares, so the page cannot drift from the code.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import sys
+from collections.abc import Iterable, Iterator
+
+from mav_robot_status.hardware import causes, identity, sensors
+from mav_robot_status.hardware.derive import INHIBITS, sensor_name
+from mav_robot_status.hardware.flight_mode import ARDUPILOT_TABLES, INAV_LIMITS
+from mav_robot_status.hardware.hearing.words import TEXT_TABLES
+from mav_robot_status.hardware.identity import Stack
+from mav_robot_status.hardware.modes import px4, standard
+from mav_robot_status.hardware.requests import Wanted, wanted_of
+from mav_robot_status.hardware.texts import TextRule, When, common
+from mav_robot_status.interface import RobotMode
+from mav_robot_status.mavlink.definitions import TYPE_NAMES
+
+HERE = pathlib.Path(__file__).resolve().parent
+
+HEAD = """# Reference: what each message means
+
+Generated from the tables in the code by `python docs/make_reference.py`; do not edit.
+
+The status informs; it is no safety function.
+"""
+
+RULES = {
+    causes.Clears.REBOOT: "when the autopilot no longer says so; an autopilot reboot",
+    causes.Clears.FAILSAFE: "its clear text; " + causes.Clears.FAILSAFE.value,
+    causes.Clears.ARMING: causes.Clears.ARMING.value,
+    causes.Clears.HOLD: causes.Clears.HOLD.value,
+}
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[str]:
+    """A Markdown table."""
+    names = list(head)
+    yield "| " + " | ".join(names) + " |"
+    yield "|" + " --- |" * len(names)
+    for row in rows:
+        yield "| " + " | ".join(str(cell).replace("|", "\\|") for cell in row) + " |"
+    yield ""
+
+
+def modes() -> Iterator[str]:
+    yield "## Flight modes\n"
+    yield "AUTO: a program decides the next motion. MANUAL: a pilot's sticks do. Any other number is UNKNOWN, unless"
+    yield "`mode_overrides` names it.\n"
+    for family, modes_of in ARDUPILOT_TABLES.items():
+        types = ", ".join(TYPE_NAMES.get(t, str(t)) for t, f in sorted(identity.FAMILIES.items()) if f is family)
+        yield f"### ArduPilot {family.value}\n"
+        yield f"MAV_TYPE {types}.\n"
+        yield from table(
+            ("custom_mode", "flight mode", "mode"), ((n, name, mode.name) for n, (name, mode) in modes_of.items())
+        )
+    yield "### PX4\n"
+    yield "The main mode is in bits 16-23 of custom_mode, the sub mode in bits 24-31.\n"
+    rows: list[tuple[tuple[object, object], str, RobotMode]] = [
+        ((main, "any other"), name, mode) for main, (name, mode) in px4.MAIN.items()
+    ]
+    rows += [(key, name, mode) for key, (name, mode) in px4.SUB.items()]
+    yield from table(("main", "sub", "flight mode", "mode"), ((*key, name, mode.name) for key, name, mode in rows))
+    yield "### INAV that announces itself as ArduPilot\n"
+    for family, limit in INAV_LIMITS.items():
+        yield f"* ArduPilot's {family.value} numbers; from {limit} up there is no mapping: UNKNOWN."
+    yield "\n### Every other autopilot\n"
+    yield "The first that says something: CURRENT_MODE.standard_mode, the standard mode of the AVAILABLE_MODES entry,"
+    yield "its property AUTO_MODE (AUTO), the flags of HEARTBEAT.base_mode.\n"
+    yield from table(
+        ("standard mode", "name", "mode"), ((n, name, mode.name) for n, (name, mode) in standard.STANDARD_MODES.items())
+    )
+    yield from table(("base_mode flags", "mode"), ((words, mode.name) for _, words, mode in standard.BASE_MODE_FLAGS))
+
+
+def codes() -> Iterator[str]:
+    yield "## Error codes\n"
+    yield "Of several active causes the first of this table is error_code; all are in `errors`.\n"
+    ordered = sorted(causes.CAUSES.items(), key=lambda item: item[1].priority)
+    yield from table(
+        ("code", "name", "ends with"),
+        ((code, cause.name, _ending(cause)) for code, cause in ordered if code // 1000 != 3),
+    )
+    yield "3000 + n is bit n of SYS_STATUS, 3100 + n bit n of its extended word; they come after the codes above up to"
+    yield "9001, and before 6000 and 7000.\n"
+
+
+def _ending(cause: causes.Cause) -> str:
+    rule = RULES[cause.clears]
+    return f"{cause.hold:g} s without repetition; {rule}" if cause.hold is not None else rule
+
+
+def bits() -> Iterator[str]:
+    yield "## SYS_STATUS bits\n"
+    yield "A bit is faulty when present, enabled and not healthy (PX4: enabled and not healthy), in two messages in a"
+    yield f"row or for {sensors.DEBOUNCE_SECONDS:g} s. HARD: an error, armed or not. SOFT: an error while armed.\n"
+    yield from table(
+        ("bit", "name", "code", *(stack.value for stack in Stack)),
+        (
+            (
+                bit,
+                sensor_name(bit),
+                3000 + bit,
+                *(w.name if (w := sensors.WEIGHTS[stack].get(bit)) else "ignored" for stack in Stack),
+            )
+            for bit in range(31)
+        ),
+    )
+    yield f"Bits {sensors.EXTENDED_BITS.start} to {sensors.EXTENDED_BITS.stop - 1} of the extended word are HARD.\n"
+
+
+def texts() -> Iterator[str]:
+    yield "## Texts\n"
+    yield "Regular expressions, matched from the start of a STATUSTEXT; the first row that matches decides. A text that"
+    yield "no row knows is 6000 + its severity for some seconds, if that is 2 or less and the vehicle is armed.\n"
+    for stack, rules in TEXT_TABLES.items():
+        if rules:
+            yield f"### {stack.value}\n"
+            yield from table(("text", "effect"), ((f"`{r.pattern.pattern}`", _effect(r)) for r in rules))
+    yield "### Of any autopilot, before a text counts as unclassified\n"
+    yield from table(("text", "effect"), ((f"`{r.pattern.pattern}`", _effect(r)) for r in common.RULES))
+
+
+def _effect(rule: TextRule) -> str:
+    named = ", ".join(f"{code} {causes.CAUSES[code].name}" for code in rule.codes)
+    when = "" if rule.when is When.ALWAYS else f", if {rule.when.value}"
+    return f"{rule.effect.value} {named}{when}".strip()
+
+
+def reasons() -> Iterator[str]:
+    yield "## Inhibits\n"
+    yield "Why motion is not possible; the bit is that of ROBOT_STATUS.inhibit_flags.\n"
+    yield from table(("bit", "name"), enumerate(INHIBITS))
+
+
+def requested() -> Iterator[str]:
+    yield "## Messages that are asked for\n"
+    yield "Only where one arrives at less than half this rate, and never if it is faster.\n"
+    sets: dict[tuple[Wanted, ...], list[str]] = {}
+    for stack in Stack:
+        for family in identity.Family:
+            sets.setdefault(wanted_of(stack, family, True), []).append(f"{stack.value} {family.value}")
+    for wanted, kinds in sets.items():
+        yield f"{', '.join(kinds)}:\n"
+        yield from table(("message", "Hz"), ((w.name, f"{w.rate:g}") for w in wanted))
+
+
+def page() -> str:
+    """The whole page."""
+    parts = (modes(), codes(), reasons(), bits(), texts(), requested())
+    return HEAD + "\n" + "\n".join(line for part in parts for line in part).rstrip() + "\n"
+
+
+def main() -> int:
+    out = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "reference.md"
+    out.write_text(page(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

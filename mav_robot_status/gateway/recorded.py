@@ -1,0 +1,69 @@
+"""The frames of a recorded log with the time of each: bytes from `link.log`, frames from `mavlink.framing`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..errors import UsageError
+from ..hardware.robot_hw import WANTED_IDS
+from ..link.log import END, STAMP_SIZE, Counts, LogReader, stamp_of, timed
+from ..mavlink.framing import Frame, Parser
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ..link.log import Piece, Stamped
+
+
+class Recording:
+    """One log. Iterating, once, gives each wanted frame with the instant at which it was heard; at the end None."""
+
+    def __init__(self, path: str) -> None:
+        """Read the file. Raises UsageError if it cannot be read."""
+        self._reader = LogReader(path)
+        self._parser = Parser(WANTED_IDS, STAMP_SIZE)
+        self._torn = 0
+        self.counts = Counts()
+
+    def __iter__(self) -> Iterator[Stamped]:
+        """Raises UsageError at the end if there was nothing in it that is MAVLink."""
+        yield from timed(self._pieces(), self.counts)
+        counters = self._parser.counters
+        if not counters.frames and not counters.unknown:
+            raise UsageError(
+                f"{self._reader.path} is not a recorded log: "
+                "no MAVLink frame with a time stamp in it; a .tlog is needed"
+            )
+
+    def summary(self) -> str:
+        """One line for the person: what was read, and of what was wrong only what occurred."""
+        counters = self._parser.counters
+        found = (
+            (counters.lost, "lost before they were recorded"),
+            (sum(counters.bad_crc.values()), "with a bad CRC"),
+            (sum(counters.unknown.values()), "of unknown kind"),
+            (counters.incompatible, "with incompatible flags"),
+            (counters.garbage_bytes, "bytes of garbage"),
+            (self._torn, "bytes of a torn record at the end"),
+            (self.counts.corrected, "wrong time stamps corrected"),
+            (self.counts.held, "stamps held while the clock was stepped back"),
+            (self.counts.jumps, "jumps of the clock, each a new segment"),
+        )
+        total = f"{self._reader.path}: {counters.frames} frames"
+        return ", ".join([total, *(f"{number} {what}" for number, what in found if number)])
+
+    def _pieces(self) -> Iterator[Piece[Frame | None]]:
+        """Each wanted frame with its stamp and the next one's; None with the stamp of the very last frame."""
+        frame: Frame | None = None
+        stamp = 0
+        for block in self._reader.blocks():
+            for following in self._parser.feed(block):
+                next_stamp = stamp_of(following.stamp, stamp)
+                if frame is not None:
+                    yield stamp, next_stamp, frame
+                frame, stamp = following, next_stamp
+        self._torn = self._parser.pending
+        if frame is not None:
+            last = stamp_of(self._parser.last_stamp, stamp)
+            yield stamp, last, frame
+            yield last, END, None

@@ -1,0 +1,268 @@
+"""Everything that the documents show is run here: programs, configurations, commands, JSON, links.
+
+Python blocks run as programs of their own; examples finish at once. Of the commands, those that end are run to their
+end in a folder with a recorded log and the example configurations; those that go on until they are stopped are started
+with free ports, given a vehicle, and stopped with a signal after their first line. Those that install are compared
+with `.ci/run`, which runs them.
+"""
+
+from __future__ import annotations
+
+import configparser
+import importlib
+import json
+import pathlib
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime, timedelta, timezone
+from typing import Any
+
+import pytest
+
+from mav_robot_status import config, testing
+from mav_robot_status.interface import (
+    Detail,
+    ErrorCause,
+    Inhibit,
+    RobotMode,
+    RobotStatus,
+    RobotStatusMsg,
+    TriState,
+    Vehicle,
+)
+from mav_robot_status.publishers import json_lines
+
+from .documents import DOCUMENTS, ROOT, Block, blocks, links, prose
+
+SCHEMA = ROOT / "mav_robot_status" / "data" / "robot_status.schema.json"
+SETUP = "python3 -m venv .venv && .venv/bin/pip install -q "
+TESTS = SETUP + "-e '.[dev]' && .venv/bin/python -m pytest"
+DEMO = SETUP + ". && .venv/bin/mav-robot-status demo"
+GENERATORS = {".venv/bin/python dialects/generate.py": ".", ".venv/bin/python docs/make_reference.py": "reference.md"}
+"""And what they write to, in the folder of the test."""
+PATIENCE = 30.0  # s until a command counts as hanging
+
+COMMANDS = [(block, line) for block in blocks("bash") for line in block.code.splitlines() if line.strip()]
+
+
+def of(*languages: str) -> pytest.MarkDecorator:
+    found = blocks(*languages)
+    assert found
+    return pytest.mark.parametrize("block", found, ids=[block.name for block in found])
+
+
+def test_every_block_is_in_a_language_that_is_checked_here() -> None:
+    assert {block.language for block in blocks()} == {"bash", "json", "python", "text", "toml", "yaml"}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_every_fence_belongs_to_a_block(document: pathlib.Path) -> None:
+    assert "```" not in prose(document)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_every_link_leads_to_something(document: pathlib.Path) -> None:
+    for link in links(document):
+        assert (document.parent / link.partition("#")[0]).exists(), link
+
+
+@pytest.mark.usefixtures("place")
+@of("python")
+def test_a_program_runs(block: Block) -> None:
+    done = subprocess.run([sys.executable, "-c", block.code], capture_output=True, text=True, timeout=PATIENCE)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@of("yaml")
+def test_a_configuration_is_one(block: Block, tmp_path: pathlib.Path) -> None:
+    path = tmp_path / "example.yaml"
+    path.write_text(block.code)
+    assert config.load(path).controllers
+
+
+# -- JSON ------------------------------------------------------------------------------------------------------------
+
+
+@of("json")
+def test_a_line_is_what_the_publisher_writes(block: Block) -> None:
+    shown = json.loads(block.code)
+    if "stamp" in shown:
+        assert json.loads(_native(shown)) == shown
+        importlib.import_module("jsonschema").validate(shown, json.loads(SCHEMA.read_text()))
+    else:
+        assert json.loads(_ros(shown)) == shown
+
+
+def _native(shown: dict[str, Any]) -> str:
+    """The line that the publisher writes of the values that a document shows."""
+    causes = tuple(ErrorCause(e["code"], e["name"], e["text"], _us(e["since"])) for e in shown["errors"])
+    inhibits = tuple(Inhibit(0, i["name"], i["text"], _us(i["since"])) for i in shown["inhibits"])
+    values = {name: TriState(-1 if shown[name] is None else shown[name]) for name in RobotStatus._fields[1:-1]}
+    status = RobotStatus(RobotMode[shown["mode"]], **values, error_code=shown["error_code"])
+    detail = Detail(shown["system"], shown["component"], causes, inhibits, Vehicle(**shown["vehicle"]))
+    msg = RobotStatusMsg(shown["handle"], _us(shown["stamp"]), status, detail, shown["link"]["heartbeat_age"])
+    return json_lines.native(msg, shown["seq"], json_lines.native_body(msg.handle, status, detail))
+
+
+def _ros(shown: dict[str, Any]) -> str:
+    header = shown["header"]
+    seconds, ns = header["stamp"].values()
+    code = shown["error_code"] if "error_code" in shown else shown["error_codes"][0]
+    values = {name: TriState(shown[name]["val"]) for name in RobotStatus._fields[1:-1]}
+    status = RobotStatus(RobotMode(shown["mode"]["val"]), **values, error_code=code)
+    detail = Detail(errors=(ErrorCause(code, "", None, 0),))
+    msg = RobotStatusMsg(header["frame_id"], seconds * 1_000_000 + ns // 1000, status, detail, None)
+    return json_lines.ros1(msg, header["seq"]) if "seq" in header else json_lines.ros2(msg, 0)
+
+
+def _us(stamp: str) -> int:
+    read = datetime.strptime(stamp, "%Y-%m-%dT%H:%M:%S.%fZ").replace(tzinfo=timezone.utc)
+    return (read - datetime(1970, 1, 1, tzinfo=timezone.utc)) // timedelta(microseconds=1)
+
+
+# -- commands --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("block", "command"), COMMANDS, ids=[f"{b.document.name}: {c}" for b, c in COMMANDS])
+def test_a_command_does_what_it_says(block: Block, command: str, place: pathlib.Path) -> None:
+    if command == TESTS:
+        assert command == " && ".join(_ci()[:3])
+    elif command == DEMO:
+        _runs_until_stopped(place, ["mav-robot-status", "demo"], signal.SIGINT)
+    elif (target := GENERATORS.get(command)) is not None:
+        subprocess.run([sys.executable, ROOT / command.split()[1], place / target], check=True, timeout=PATIENCE)
+    elif command.startswith(".venv/bin/"):
+        assert command in _ci()
+    elif command.startswith("mav-robot-status ") and re.search(r" udp:| --config ", command):
+        _runs_until_stopped(place, _with_free_ports(place, command).split(), signal.SIGTERM)
+    elif command.startswith("mav-robot-status "):
+        before = {path.name for path in place.iterdir()}
+        done = _bash(_beside_pymavlink(place, command))
+        assert done.stdout or {path.name for path in place.iterdir()} - before
+    else:
+        pytest.fail(f"{block.name}: nothing here checks this command: {command}")
+
+
+def test_the_readme_leads_with_the_command_and_the_two_lines_of_the_minute() -> None:
+    commands = [command for block, command in COMMANDS if block.document.name == "README.md"]
+    assert commands[:3] == ["mav-robot-status udp:127.0.0.1:14550", DEMO, TESTS]
+
+
+def test_the_line_that_the_readme_shows_is_one_of_a_rover_that_was_just_switched_on(place: pathlib.Path) -> None:
+    shown = json.loads(next(b.code for b in blocks("json") if b.document.name == "README.md"))
+    command = _with_free_ports(place, "mav-robot-status udp:127.0.0.1:14550 --changes-only").split()
+    with _vehicle(command, testing.DEMO), _running(command) as process:
+        assert process.stdout is not None
+        for text in process.stdout:
+            line = json.loads(text)
+            if [i["text"] for i in line["inhibits"]] == [i["text"] for i in shown["inhibits"]]:
+                break
+        process.terminate()
+    for name in ("stamp", "seq", "link"):
+        assert _shape(line.pop(name)) == _shape(shown.pop(name))
+    for inhibit in (*line["inhibits"], *shown["inhibits"]):
+        del inhibit["since"]
+    assert line == shown
+
+
+def test_a_publisher_is_found_by_its_entry_point_as_the_document_says(
+    place: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The example of docs/controller.md, installed: its module, its entry point, its configuration."""
+    own = [block for block in blocks() if block.document.name == "controller.md"]
+    at = next(i for i, block in enumerate(own) if block.language == "toml")
+    (place / "status_lamp.py").write_text(own[at - 1].code)
+    (place / "lamp.yaml").write_text(own[at + 1].code)
+    toml = configparser.ConfigParser()
+    toml.optionxform = str  # type: ignore[assignment,method-assign]
+    toml.read_string(own[at].code)
+    section = 'project.entry-points."mav_robot_status.publishers"'
+    info = place / "status_lamp-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {toml['project']['name']}\nVersion: 1.0\n")
+    points = "".join(f"{name} = {target}\n" for name, target in toml[section].items()).replace('"', "")
+    (info / "entry_points.txt").write_text(f"[mav_robot_status.publishers]\n{points}")
+    monkeypatch.setenv("PYTHONPATH", str(place))
+    assert _bash("mav-robot-status flight.tlog --config lamp.yaml").stdout
+    assert (place / "lamp.txt").read_text() == "off\n"
+
+
+def _ci() -> list[str]:
+    """The lines of .ci/run from the set-up on."""
+    lines = (ROOT / ".ci" / "run").read_text().splitlines()
+    return lines[lines.index("python3 -m venv .venv") :]
+
+
+def _bash(command: str) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def _beside_pymavlink(place: pathlib.Path, command: str) -> str:
+    """A command that writes among pymavlink's files: the folder is looked at, and replaced by one of the test."""
+    folder = re.search(r'"\$\((.*)\)"', command)
+    if folder is None:
+        return command
+    assert (pathlib.Path(_bash(folder[1]).stdout.strip()) / "common.xml").exists()
+    return command.replace(folder[0], str(place / "dialects"))
+
+
+def _with_free_ports(place: pathlib.Path, command: str) -> str:
+    """The command, and the configurations in the folder, with ports that nobody uses."""
+    configurations = {path: path.read_text() for path in (place / "config").glob("*.yaml")}
+    for port in sorted(set(re.findall(r":(145\d\d)\b", command + "".join(configurations.values())))):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_port:
+            any_port.bind(("127.0.0.1", 0))
+            free = str(any_port.getsockname()[1])
+        command = command.replace(port, free)
+        configurations = {path: text.replace(port, free) for path, text in configurations.items()}
+    for path, text in configurations.items():
+        path.write_text(text)
+    return command
+
+
+@contextmanager
+def _running(command: list[str]) -> Iterator[subprocess.Popen[str]]:
+    """A process that is killed if it hangs; at the end it has to have stopped with 0."""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        watchdog = threading.Timer(PATIENCE, process.kill)
+        watchdog.start()
+        try:
+            yield process
+            _, log = process.communicate()
+        finally:
+            watchdog.cancel()
+            process.kill()
+        assert process.returncode == 0, log
+        assert "Traceback" not in log
+        assert "listening on" in log
+
+
+def _runs_until_stopped(place: pathlib.Path, command: list[str], stop: signal.Signals) -> None:
+    with _vehicle(command, testing.ardurover.READY), _running(command) as process:
+        assert process.stdout is not None
+        assert json.loads(process.stdout.readline())["seq"] == 0
+        process.send_signal(stop)
+
+
+@contextmanager
+def _vehicle(command: list[str], scenario: testing.Scenario) -> Iterator[None]:
+    """A vehicle that sends to where the command listens, if it says where."""
+    port = next((part.rpartition(":")[2] for part in command if part.startswith("udp:")), None)
+    if port is None:
+        yield
+        return
+    with testing.FakeAutopilot(scenario, to=("127.0.0.1", int(port))):
+        yield
+
+
+def _shape(value: object) -> object:
+    """The keys and types of a value."""
+    return {key: _shape(item) for key, item in value.items()} if isinstance(value, dict) else type(value)

@@ -1,0 +1,146 @@
+"""The installed command as a process, its lines with the time of their arrival. Every wait has an end."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import IO, Any, NamedTuple, TypeVar
+
+COMMAND = (sys.executable, "-m", "mav_robot_status.cli")
+T = TypeVar("T")
+
+SOON = 8.0
+"""Seconds that anything may take which should happen at once: generous, for a busy machine."""
+
+
+class Line(NamedTuple):
+    """One JSON line."""
+
+    at: float
+    """When it arrived: seconds on the monotonic clock."""
+    status: dict[str, Any]
+
+
+def run(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run the command to its end."""
+    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=30, check=False, **options)
+
+
+class Gateway:
+    """A gateway that runs until `stop`, or until it ends by itself."""
+
+    def __init__(self, *arguments: str, reads: bool = True) -> None:
+        """Start it; with `reads` false its standard output is a pipe that nobody reads."""
+        self.lines: list[Line] = []
+        self.log: list[str] = []
+        self._news = threading.Condition()
+        self.started = time.monotonic()
+        self.process = subprocess.Popen([*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        assert self.process.stdout is not None
+        assert self.process.stderr is not None
+        self._threads = [threading.Thread(target=self._read, args=(self.process.stderr, self._take_log), daemon=True)]
+        if reads:
+            self._threads.append(
+                threading.Thread(target=self._read, args=(self.process.stdout, self._take_line), daemon=True)
+            )
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def port(self) -> int:
+        """The port of the first link that listens."""
+        return self.ports(1)[0]
+
+    def ports(self, count: int) -> list[int]:
+        """The ports of the first links that listen."""
+
+        def listening() -> list[int] | None:
+            found = [int(m[1]) for line in self.log if (m := re.search(r"listening on \S+:(\d+)/udp", line))]
+            return found if len(found) >= count else None
+
+        return self._until(listening, SOON, f"{count} ports")
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Where the gateway listens."""
+        return "127.0.0.1", self.port
+
+    def wait_for(
+        self, wanted: Callable[[dict[str, Any]], bool], timeout: float = SOON, after: float = 0.0, what: str = ""
+    ) -> Line:
+        """The first line, arrived later than `after`, of which `wanted` is true."""
+
+        def found() -> Line | None:
+            return next((line for line in self.lines if line.at > after and wanted(line.status)), None)
+
+        return self._until(found, timeout, what or "a line")
+
+    def wait_for_log(self, pattern: str, timeout: float = SOON) -> re.Match[str]:
+        """The first match of `pattern` in the log."""
+        return self._until(
+            lambda: next((m for line in self.log if (m := re.search(pattern, line))), None), timeout, pattern
+        )
+
+    def wait_for_end(self, timeout: float = SOON) -> int:
+        """The exit code."""
+        code = self.process.wait(timeout)
+        for thread in self._threads:
+            thread.join(timeout)
+        return code
+
+    def stop(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """End it with a signal; the exit code."""
+        self.process.send_signal(number)
+        return self.wait_for_end()
+
+    def memory(self) -> float:
+        """Resident memory in MB."""
+        with open(f"/proc/{self.process.pid}/status", encoding="ascii") as status:
+            return int(next(line for line in status if line.startswith("VmRSS")).split()[1]) / 1024
+
+    def cpu(self) -> float:
+        """Seconds of processor time used so far."""
+        with open(f"/proc/{self.process.pid}/stat", encoding="ascii") as stat:
+            fields = stat.read().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / 100
+
+    def close(self) -> None:
+        """End it for sure."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        for thread in self._threads:
+            thread.join(SOON)
+        for pipe in (self.process.stdout, self.process.stderr):
+            if pipe is not None:
+                pipe.close()
+
+    def _until(self, found: Callable[[], T | None], timeout: float, what: str) -> T:
+        deadline = time.monotonic() + timeout
+        with self._news:
+            while not (result := found()):
+                left = deadline - time.monotonic()
+                if left <= 0:
+                    raise AssertionError(
+                        f"no {what} within {timeout} s; last lines {self.lines[-2:]}, log: " + "\n".join(self.log[-20:])
+                    )
+                self._news.wait(left)
+        return result
+
+    def _read(self, pipe: IO[bytes], take: Callable[[str], None]) -> None:
+        for raw in pipe:
+            with self._news:
+                take(raw.decode())
+                self._news.notify_all()
+
+    def _take_line(self, text: str) -> None:
+        self.lines.append(Line(time.monotonic(), json.loads(text)))
+
+    def _take_log(self, text: str) -> None:
+        self.log.append(text.rstrip())

@@ -1,0 +1,71 @@
+"""The other commands: demo, check-config, dialect."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_robot_status.demo import run_demo
+
+from .gateway_process import Gateway, run
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_demo_tells_its_story_and_ends(tmp_path: Path, validate: Callable[[Any], None]) -> None:
+    with open(tmp_path / "lines", "w+", encoding="utf-8") as stdout:
+        run_demo(stdout, speed=12.0)
+        stdout.seek(0)
+        statuses = [json.loads(line) for line in stdout]
+    for status in statuses:
+        validate(status)
+    assert [s["drives_powered"] for s in statuses if s["mode"] == "AUTO"].count(True) > 0
+    assert any(s["in_error"] for s in statuses)
+    assert 5 < len(statuses) < 60
+
+
+def test_the_demo_starts_at_once_and_sigint_ends_it(gateway: Callable[..., Gateway]) -> None:
+    gate = gateway("demo")
+    line = gate.wait_for(lambda s: s["vehicle"]["type"] == "GROUND_ROVER")
+    assert line.at - gate.started < 3.0
+    gate.wait_for_log("power on")
+    assert gate.stop(signal.SIGINT) == 0
+    assert not any("Traceback" in text for text in gate.log)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "config").glob("*.yaml")), ids=lambda path: path.name)
+def test_every_example_configuration_is_understood(path: Path) -> None:
+    done = run("check-config", str(path))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "link: " in done.stdout
+    assert "controller " in done.stdout
+
+
+def test_check_config_says_where_the_fault_is(tmp_path: Path) -> None:
+    config = tmp_path / "faulty.yaml"
+    config.write_text("links: [udp:127.0.0.1:14550]\nhardware:\n  heartbeat_timeuot: 3\n")
+    done = run("check-config", str(config))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"mav-robot-status: {config}:3:3: ")
+    assert "heartbeat_timeout" in done.stderr
+
+
+def test_dialect_writes_xml_and_lua(tmp_path: Path) -> None:
+    done = run("dialect", "-o", str(tmp_path / "new"))
+    assert done.returncode == 0
+    xml, lua = (Path(line) for line in done.stdout.splitlines())
+    assert xml.read_bytes() == (ROOT / "dialects" / "mav_robot_status.xml").read_bytes()
+    assert "59900" in lua.read_text("utf-8")
+    assert "ROBOT_STATUS" in lua.read_text("utf-8")
+
+
+def test_dialect_says_where_it_cannot_write(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = run("dialect", "-o", str(tmp_path / "file" / "folder"))
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1

@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from mav_robot_status.clock import Instant
+from mav_robot_status.errors import LinkError
+from mav_robot_status.gateway.guard import Guard, GuardedPublisher
+from mav_robot_status.interface import Detail, RobotStatus, RobotStatusMsg
+
+NOW = Instant(0.0, 0)
+MSG = RobotStatusMsg("robot", 0, RobotStatus(), Detail(), None)
+
+
+class Faulty:
+    periodic = False
+
+    def __init__(self, error: Exception) -> None:
+        self.error = error
+        self.closed = False
+        self.published = 0
+
+    def busy(self) -> bool:
+        return True
+
+    def publish(self, msg: RobotStatusMsg) -> None:
+        self.published += 1
+        raise self.error
+
+    def service(self, now: Instant) -> float | None:
+        return 1.5
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_a_guard_hands_on_what_the_function_returns() -> None:
+    assert Guard("x").call(0, max, 3, 4) == 4
+
+
+def test_the_first_exception_is_logged_and_the_part_is_called_no_more(caplog: pytest.LogCaptureFixture) -> None:
+    guard = Guard("controller 'arm'")
+    with caplog.at_level(logging.ERROR):
+        assert guard.call(7, int, "no number") == 7
+        assert guard.call(7, int, "8") == 7
+    assert [record.message for record in caplog.records] == [
+        "controller 'arm' has failed and is stopped; everything else goes on"
+    ]
+
+
+@pytest.mark.parametrize("error", [LinkError("full"), BrokenPipeError()])
+def test_what_concerns_the_person_gets_through_a_controllers_guard(error: Exception) -> None:
+    with pytest.raises(type(error)):
+        Guard("x").call(None, Faulty(error).publish, MSG)
+
+
+def test_a_faulty_publisher_takes_part_no_more_but_is_closed() -> None:
+    faulty = Faulty(BrokenPipeError("its own socket"))
+    guarded = GuardedPublisher(faulty, "mine")
+    assert guarded.periodic is False
+    assert guarded.busy() is True
+    assert guarded.service(NOW) == 1.5
+    guarded.publish(MSG)
+    guarded.publish(MSG)
+    assert faulty.published == 1
+    assert guarded.busy() is False
+    assert guarded.service(NOW) is None
+    guarded.close()
+    assert faulty.closed
+
+
+def test_a_publisher_may_end_the_gateway_with_an_error_for_the_person() -> None:
+    with pytest.raises(LinkError, match="for good"):
+        GuardedPublisher(Faulty(LinkError("for good")), "mine").publish(MSG)

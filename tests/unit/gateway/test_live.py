@@ -1,0 +1,206 @@
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import TextIO
+
+import pytest
+
+from mav_robot_status.clock import Instant, later
+from mav_robot_status.config import Config, IdentityConfig, LinkConfig, PublisherConfig
+from mav_robot_status.errors import LinkError
+from mav_robot_status.gateway.live import Live
+from mav_robot_status.gateway.plant import DEFAULT_CONTROLLER
+from mav_robot_status.link.udp import UdpLink
+from mav_robot_status.mavlink.definitions import Heartbeat
+from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.framing import Frame, Parser
+from mav_robot_status.testing import ManualClock
+
+HERE = LinkConfig("udpin:127.0.0.1:0")
+
+
+class Turning(Live):
+    """Counts its turns."""
+
+    turns = 0
+
+    def turn(self, now: Instant) -> None:
+        self.turns += 1
+        super().turn(now)
+
+
+@pytest.fixture
+def stdout(tmp_path: Path) -> Iterator[TextIO]:
+    with open(tmp_path / "stdout", "w+", encoding="utf-8") as file:
+        yield file
+
+
+@pytest.fixture
+def vehicle() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        made.bind(("127.0.0.1", 0))
+        made.settimeout(5)
+        yield made
+
+
+def autopilot(system: int = 1, sequence: int = 0) -> bytes:
+    return encode(Heartbeat(0, 10, 3, 65, 4, 3), system=system, component=1, sequence=sequence)
+
+
+def address(live: Live) -> tuple[str, int]:
+    link = live.stations[0].link
+    assert isinstance(link, UdpLink)
+    return "127.0.0.1", link.port
+
+
+def heard(vehicle: socket.socket) -> list[Frame]:
+    """What is waiting at the vehicle."""
+    frames: list[Frame] = []
+    vehicle.setblocking(False)
+    with suppress(BlockingIOError):
+        while True:
+            frames += Parser({0, 76, 59900}).feed(vehicle.recv(1000))
+    return frames
+
+
+def descriptors() -> int:
+    return len(os.listdir("/proc/self/fd"))
+
+
+def run_for(live: Live, seconds: float) -> None:
+    thread = threading.Thread(target=live.run)
+    thread.start()
+    time.sleep(seconds)
+    live.stop()
+    thread.join(5)
+    assert not thread.is_alive()
+
+
+@pytest.mark.parametrize(("with_vehicle", "most"), [(False, 5), (True, 45)])
+def test_an_idle_second_takes_no_more_turns_than_there_are_things_to_do(
+    stdout: TextIO, vehicle: socket.socket, with_vehicle: bool, most: int
+) -> None:
+    live = Turning(Config(links=(HERE,)), stdout)
+    if with_vehicle:  # 10 lines, 10 looks of the hardware, each perhaps in two turns; requests and heartbeats
+        vehicle.sendto(autopilot(), address(live))
+    run_for(live, 1.0)
+    assert 1 <= live.turns < most
+
+
+def test_input_gathers_while_coalescing(stdout: TextIO, vehicle: socket.socket) -> None:
+    live = Turning(Config(links=(HERE,), coalesce=0.3), stdout)
+    thread = threading.Thread(target=live.run)
+    thread.start()
+    for _ in range(50):
+        vehicle.sendto(b"\xfd", address(live))
+        time.sleep(0.005)
+    before = time.monotonic()
+    live.stop()
+    thread.join(5)
+    assert time.monotonic() - before < 1.0
+    assert live.turns < 10
+
+
+def test_what_fails_half_way_leaves_nothing_open(stdout: TextIO, vehicle: socket.socket) -> None:
+    before = descriptors()
+    taken = LinkConfig(f"udpin:127.0.0.1:{vehicle.getsockname()[1]}")
+    with pytest.raises(LinkError, match="taken"):
+        Live(Config(links=(HERE, HERE, taken)), stdout)
+    nowhere = PublisherConfig("json", {"path": "/nowhere/x"})
+    controller = DEFAULT_CONTROLLER.__class__("c", DEFAULT_CONTROLLER.type, {}, "f:1:1", (nowhere,))
+    with pytest.raises(LinkError, match="nowhere"):
+        Live(Config(links=(HERE,), outs=(HERE,), controllers=(controller,)), stdout)
+    assert descriptors() == before
+
+
+def test_closing_lets_go_of_everything_and_stopping_after_it_is_harmless(stdout: TextIO) -> None:
+    before = descriptors()
+    live = Live(Config(links=(HERE,)), stdout)
+    handlers = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)
+    live.stop_on_signals()
+    live.close()
+    live.stop()
+    assert descriptors() == before
+    assert (signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)) == handlers
+
+
+def test_a_signal_stops_it(stdout: TextIO) -> None:
+    live = Live(Config(links=(HERE,)), stdout)
+    live.stop_on_signals()
+    threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    started = time.monotonic()
+    live.run()
+    assert time.monotonic() - started < 0.9
+
+
+def test_heartbeats_keep_their_phase(stdout: TextIO, vehicle: socket.socket) -> None:
+    clock = ManualClock()
+    live = Live(Config(links=(HERE,), requests="none"), stdout, clock.now)
+    with closing(live):
+        start = clock.now()
+        vehicle.sendto(autopilot(), address(live))
+        time.sleep(0.01)
+        live._receive(live.stations[0], start)
+        beats = []
+        for late in (0.0, 1.04, 2.03, 3.02, 9.0, 10.0):
+            live.turn(later(start, late))
+            beats.append(sum(f.message_id == 0 for f in heard(vehicle)))
+        assert beats == [1, 1, 1, 1, 1, 1]
+        live.turn(later(start, 10.99))
+        assert not [f for f in heard(vehicle) if f.message_id == 0]
+
+
+def test_two_vehicles_are_spoken_for_and_asked_each_at_its_own_address(stdout: TextIO, vehicle: socket.socket) -> None:
+    live = Live(Config(links=(HERE,)), stdout)
+    with closing(live), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
+        second.bind(("127.0.0.1", 0))
+        start = Instant(50.0, 0)
+        vehicle.sendto(autopilot(7), address(live))
+        second.sendto(autopilot(9), address(live))
+        time.sleep(0.01)
+        live._receive(live.stations[0], start)
+        live.turn(start)
+        assert {f.system for f in heard(vehicle)} == {f.system for f in heard(second)} == {7, 9}
+        live.turn(later(start, 3.01))
+        assert [(f.system, f.component) for f in heard(vehicle) if f.message_id == 76] == [(7, 192)]
+        assert [(f.system, f.component) for f in heard(second) if f.message_id == 76] == [(9, 192)]
+
+
+def test_a_vehicle_that_moves_to_another_address_is_asked_there(stdout: TextIO, vehicle: socket.socket) -> None:
+    live = Live(Config(links=(HERE,)), stdout)
+    with closing(live), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as new:
+        new.bind(("127.0.0.1", 0))
+        start = Instant(50.0, 0)
+        for sender in (vehicle, new):
+            sender.sendto(autopilot(), address(live))
+            time.sleep(0.01)
+            live._receive(live.stations[0], start)
+        live.turn(start)
+        live.turn(later(start, 3.01))
+        assert [f for f in heard(new) if f.message_id == 76]
+        assert not [f for f in heard(vehicle) if f.message_id == 76]
+
+
+def test_the_heartbeat_can_be_switched_off(stdout: TextIO, vehicle: socket.socket) -> None:
+    live = Live(Config(links=(HERE,), identity=IdentityConfig(heartbeat=False)), stdout)
+    vehicle.sendto(autopilot(), address(live))
+    run_for(live, 0.2)
+    assert {f.message_id for f in heard(vehicle)} == {59900}
+
+
+def test_silence_is_told_after_3_5_s_and_then_every_30_s(stdout: TextIO, caplog: pytest.LogCaptureFixture) -> None:
+    live = Live(Config(links=(HERE,)), stdout)
+    with closing(live):
+        live._told_at = 3.5
+        for at in (3.4, 3.5, 3.6, 20.0, 33.4, 33.6):
+            live.turn(Instant(at, 0))
+    told = [r.message for r in caplog.records if "no autopilot heard yet" in r.message]
+    assert len(told) == 2
+    assert "nothing that is MAVLink" in told[0]

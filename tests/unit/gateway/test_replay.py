@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, TextIO
+
+import pytest
+
+from mav_robot_status.config import Config
+from mav_robot_status.errors import UsageError
+from mav_robot_status.gateway.replay import replay
+from mav_robot_status.mavlink.definitions import Heartbeat
+from mav_robot_status.mavlink.encode import encode
+
+START_US = 1_800_000_000_000_000
+
+
+@pytest.fixture
+def stdout(tmp_path: Path) -> Iterator[TextIO]:
+    with open(tmp_path / "stdout", "w+", encoding="utf-8") as file:
+        yield file
+
+
+def log_of(path: Path, *seconds: float) -> str:
+    """A log with a heartbeat at each of these times."""
+    with open(path, "wb") as log:
+        for sequence, at in enumerate(seconds):
+            log.write(round(START_US + at * 1e6).to_bytes(8, "big"))
+            log.write(encode(Heartbeat(0, 10, 3, 65, 4, 3), system=1, component=1, sequence=sequence))
+    return str(path)
+
+
+def replayed(path: str, stdout: TextIO) -> list[dict[str, Any]]:
+    replay(Config(), path, stdout)
+    stdout.seek(0)
+    return [json.loads(line) for line in stdout]
+
+
+def test_lines_continue_through_a_gap_as_they_would_live(tmp_path: Path, stdout: TextIO) -> None:
+    lines = replayed(log_of(tmp_path / "a.tlog", 0, 1, 2, 12, 13), stdout)
+    states = [line["link"]["state"] for line in lines]
+    assert len(lines) == pytest.approx(130, abs=6)
+    assert states[0] == states[-1] == "CONNECTED"
+    assert states.count("LOST") == pytest.approx(65, abs=2)  # from 3.5 s after the heartbeat at 2 until that at 12
+    first_lost = next(line for line in lines if line["link"]["state"] == "LOST")
+    assert first_lost["stamp"].startswith("2027-01-15T08:00:05.5")
+
+
+def test_a_jump_of_the_clock_begins_anew_without_lines_in_between(tmp_path: Path, stdout: TextIO) -> None:
+    lines = replayed(log_of(tmp_path / "a.tlog", 0, 1, 90_000, 90_001), stdout)
+    assert 15 < len(lines) < 30
+    assert {line["link"]["state"] for line in lines} == {"CONNECTED"}
+    assert [line["seq"] for line in lines] == list(range(len(lines)))
+
+
+def test_a_missing_log_is_an_error_for_the_person(tmp_path: Path, stdout: TextIO) -> None:
+    with pytest.raises(UsageError, match="cannot read the log"):
+        replay(Config(), str(tmp_path / "missing.tlog"), stdout)

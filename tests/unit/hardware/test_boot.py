@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+from mav_robot_status.hardware.boot import WRAP, Boot, heard_clock
+
+
+def clocked(*samples: tuple[float, int]) -> tuple[Boot, int]:
+    """The clock after (time, time_boot_ms) samples, and how many reboots they showed."""
+    boot, reboots = Boot(samples[0][0]), 0
+    for now, clock_ms in samples:
+        boot, anew = heard_clock(boot, clock_ms, now)
+        reboots += anew
+    return boot, reboots
+
+
+def test_the_sample_that_came_quickest_tells_when_it_booted() -> None:
+    assert clocked((1000.5, 60_000), (1001.0, 61_000), (1002.9, 62_000)) == (Boot(940.0, 62_000), 0)
+
+
+def test_the_first_sample_tells_when_it_booted() -> None:
+    assert clocked((1000.0, 60_000)) == (Boot(940.0, 60_000), 0)
+
+
+def test_a_clock_that_goes_on_is_no_reboot() -> None:
+    assert clocked((1000.0, 60_000), (1001.0, 61_000), (1030.0, 90_000)) == (Boot(940.0, 90_000), 0)
+
+
+def test_a_step_back_counts_when_the_next_sample_confirms_it() -> None:
+    assert clocked((1000.0, 900_000), (1001.0, 1200))[1] == 0
+    assert clocked((1000.0, 900_000), (1001.0, 1200), (1001.5, 1700)) == (Boot(999.8, 1700), 1)
+
+
+def test_a_single_packet_from_the_past_is_no_reboot() -> None:
+    boot, reboots = clocked((1000.0, 900_000), (1001.0, 890_000), (1001.5, 901_500), (1002.0, 891_000))
+    assert reboots == 0
+    assert boot.clock_ms == 901_500
+
+
+def test_packets_that_are_repeated_backwards_are_no_reboot() -> None:
+    assert clocked((1000.0, 900_000), (1001.0, 890_000), (1001.1, 880_000), (1001.2, 870_000))[1] == 0
+
+
+def test_a_small_step_back_changes_nothing() -> None:
+    assert clocked((1000.0, 900_000), (1000.1, 899_000), (1000.2, 898_100)) == (Boot(100.0, 900_000), 0)
+
+
+def test_a_clock_that_wraps_is_no_reboot() -> None:
+    assert clocked((1000.0, WRAP - 1000), (1002.0, 1000), (1001.9, WRAP - 500), (1003.0, 2000))[1] == 0
+
+
+def test_a_second_reboot_is_noticed_too() -> None:
+    assert clocked((0.0, 900_000), (1.0, 0), (2.0, 1000), (9.0, 8000), (10.0, 500), (11.0, 1500))[1] == 2

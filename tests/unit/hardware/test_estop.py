@@ -1,0 +1,107 @@
+from __future__ import annotations
+
+import pytest
+
+from mav_robot_status.clock import Instant, later
+from mav_robot_status.hardware.estop import NOTHING, READY_MESSAGES, Stop, heard_sys_status, said, still_said
+from mav_robot_status.hardware.identity import Stack
+from mav_robot_status.hardware.pulse import Pulse, first_beat
+from mav_robot_status.interface import TriState
+from mav_robot_status.mavlink.definitions import Heartbeat, SysStatus
+
+from .driver import FITTED, MOTORS, PREARM, copter
+
+NOW = Instant(1000.0, 1_800_000_000_000_000)
+ALL = FITTED | PREARM
+READY = SysStatus._make((ALL, ALL, ALL, *[0] * 13))
+NOT_READY = READY._replace(onboard_control_sensors_health=FITTED)
+HIGH, PREARM_TEXT = "RC7: MotorEStop HIGH", "PreArm: Motors Emergency Stopped"
+
+
+def beaten(armed: bool = False) -> Pulse:
+    return first_beat(Heartbeat(0, 2, 3, 0x81 if armed else 1, 3, 3), NOW)
+
+
+def heard(stop: Stop, *messages: tuple[float, SysStatus], stack: Stack = Stack.ARDUPILOT, armed: bool = False) -> Stop:
+    for seconds, status in messages:
+        stop = heard_sys_status(stop, status, beaten(armed), stack, NOW.mono + seconds)
+    return stop
+
+
+def test_two_ready_messages_well_after_the_disarm_show_that_nothing_is_stopped() -> None:
+    assert heard(NOTHING, (2.0, READY)).ready < READY_MESSAGES
+    assert heard(NOTHING, (2.0, READY), (2.5, READY)).ready == READY_MESSAGES
+
+
+def test_messages_just_after_the_disarm_do_not_count() -> None:
+    assert heard(NOTHING, (0.5, READY), (1.9, READY), (2.0, READY)).ready == 1
+
+
+@pytest.mark.parametrize(
+    "between", [NOT_READY, READY._replace(onboard_control_sensors_enabled=ALL & ~MOTORS)], ids=["not ready", "switch"]
+)
+def test_the_count_begins_anew_when_a_check_fails_or_the_safety_switch_is_on(between: SysStatus) -> None:
+    assert heard(NOTHING, (3, READY), (4, between), (5, READY)).ready == 1
+
+
+def test_messages_of_an_armed_vehicle_or_of_another_autopilot_do_not_count() -> None:
+    assert heard(NOTHING, (3, READY), (4, READY), armed=True).ready == 0
+    assert heard(NOTHING, (3, READY), (4, READY), stack=Stack.PX4).ready == 0
+
+
+def test_passing_checks_end_what_a_text_said() -> None:
+    stop = heard(said(NOTHING, True, HIGH, NOW), (3, READY), (4, READY))
+    assert still_said(stop, NOW.mono + 4) is TriState.UNKNOWN
+    assert stop.ready == READY_MESSAGES
+
+
+def test_checks_that_have_not_run_since_the_text_do_not_end_it() -> None:
+    stop = said(NOTHING, True, HIGH, later(NOW, 10))
+    stop = heard(stop, (10.1, READY), (10.6, READY), (11.1, NOT_READY))
+    assert still_said(stop, NOW.mono + 12) is TriState.TRUE
+
+
+def test_a_text_that_is_repeated_is_over_when_it_is_repeated_no_more() -> None:
+    stop = said(NOTHING, True, PREARM_TEXT, NOW)
+    assert still_said(stop, NOW.mono + 34.9) is TriState.TRUE
+    assert still_said(stop, NOW.mono + 35) is TriState.UNKNOWN
+    assert still_said(said(NOTHING, True, HIGH, NOW), NOW.mono + 1000) is TriState.TRUE
+
+
+def test_the_opposite_text_counts_and_a_repetition_keeps_the_beginning() -> None:
+    stop = said(said(NOTHING, True, HIGH, NOW), True, HIGH, later(NOW, 1))
+    assert (stop.since, stop.last) == (NOW, NOW.mono + 1)
+    stop = said(stop, False, "RC7: MotorEStop LOW", later(NOW, 2))
+    assert (stop.said, stop.since) == (TriState.FALSE, later(NOW, 2))
+
+
+def test_a_switch_that_is_turned_while_disarmed_is_a_stop_though_fast_messages_still_read_healthy() -> None:
+    flight = copter().stop("sys_status").stream("sys_status", lambda: flight.sys_status(), hz=4)
+    flight.wait(10)
+    assert flight.status.e_stopped is TriState.FALSE
+    flight.text(HIGH, 6)
+    seen = flight.wait(0.9)
+    flight.set(health=FITTED)
+    seen += flight.wait(10)
+    assert {status.e_stopped for status in seen} == {TriState.TRUE}
+    flight.set(health=ALL)
+    flight.wait(1)
+    assert flight.status.e_stopped is TriState.FALSE
+
+
+def test_evidence_of_a_stop_ends_with_the_next_arming() -> None:
+    flight = copter()
+    flight.text(PREARM_TEXT, 2).hb(armed=True)
+    assert flight.status.e_stopped is TriState.UNKNOWN
+    flight.text("RC7: MotorEStop LOW", 6).hb(armed=False)
+    flight.set(health=FITTED).wait(1)
+    flight.hb(armed=True)
+    assert flight.status.e_stopped is TriState.UNKNOWN
+
+
+def test_a_stop_said_between_the_arming_and_its_heartbeat_stays() -> None:
+    flight = copter()
+    flight.wait(10)
+    flight.wait(0.5)
+    flight.text(HIGH, 6).hb(armed=True)
+    assert flight.status.e_stopped is TriState.TRUE

@@ -1,0 +1,370 @@
+"""One message more: what each kind does to a memory, seen in the status or in the memory itself."""
+
+from __future__ import annotations
+
+import math
+from struct import pack
+from typing import Any
+
+import pytest
+
+from mav_robot_status.hardware.memory import Memory
+from mav_robot_status.hardware.options import HardwareOptions
+from mav_robot_status.interface import RobotMode, TriState
+from mav_robot_status.mavlink import definitions as mav
+
+from .driver import (
+    ACTIVE,
+    AHRS,
+    CRITICAL,
+    EMERGENCY,
+    FENCE,
+    FITTED,
+    GPS,
+    GYRO,
+    MOTORS,
+    PLANE,
+    PREARM,
+    PX4,
+    ROVER,
+    STANDBY,
+    Flight,
+    copter,
+    px4,
+    rover,
+)
+
+TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
+
+
+def memory_of(flight: Flight) -> Memory:
+    memory = flight.vehicle.memory
+    assert memory is not None
+    return memory
+
+
+def here(flight: Flight, *velocity: float, lat: int = 1) -> mav.GlobalPositionInt:
+    vx, vy, vz = (round(v * 100) for v in velocity)
+    return mav.GlobalPositionInt(flight.boot_ms, lat, 0, 0, 0, vx, vy, vz, 0)
+
+
+def local(flight: Flight, *velocity: float) -> mav.LocalPositionNed:
+    return mav.LocalPositionNed._make((flight.boot_ms, 0, 0, 0, *velocity))
+
+
+def hud(ground: float, climb: float) -> mav.VfrHud:
+    return mav.VfrHud(0.0, ground, 0.0, climb, 0, 0)
+
+
+def moving(flight: Flight, message: Any, seconds: float = 2.0) -> TriState:
+    """in_motion after this message was repeated for a while."""
+    flight.stream("motion", message, hz=5).wait(seconds)
+    return flight.status.in_motion
+
+
+# -- heartbeats, reboots, identity -------------------------------------------------------------------------------------
+
+
+def test_latches_survive_a_short_loss_and_not_a_long_one() -> None:
+    flight = copter().text("Crash: Disarming: AngErr=42", 0)
+    flight.stop("heartbeat").wait(20)
+    assert flight.codes == []
+    assert flight.stream("heartbeat", flight.heartbeat).look().codes == [4001]
+    flight.stop("heartbeat").wait(31)
+    assert flight.stream("heartbeat", flight.heartbeat).look().codes == []
+
+
+def test_another_autopilot_with_the_same_ids_begins_anew() -> None:
+    flight = copter().text("Crash: Disarming: AngErr=42", 0)
+    flight.hb(vehicle_type=ROVER)
+    assert (flight.codes, flight.detail.vehicle.type) == ([], "GROUND_ROVER")
+    assert flight.vehicle.boots == 0
+
+
+def test_two_autopilots_that_take_turns_with_the_same_ids_are_a_conflict_until_one_is_silent() -> None:
+    flight = copter().stop("sys_status")
+    flight.stream("other", lambda: flight.heartbeat()._replace(type=ROVER))
+    flight.wait(1)
+    assert {status.error_code for status in flight.wait(20)} == {9002}
+    flight.stop("other").wait(12)
+    assert flight.codes == []
+
+
+@pytest.mark.parametrize(("autopilot", "state", "reboots"), [(3, 1, 1), (3, 0, 1), (PX4, 0, 0), (3, 2, 0), (0, 0, 1)])
+def test_a_state_of_starting_after_standby_is_a_reboot_but_not_uninit_of_px4(
+    autopilot: int, state: int, reboots: int
+) -> None:
+    flight = Flight(autopilot).hb(state=STANDBY)
+    flight.wait(2)
+    flight.hb(state=state).wait(3)
+    assert flight.vehicle.boots == reboots
+
+
+def test_mode_initialising_after_another_is_a_reboot() -> None:
+    flight = Flight(vehicle_type=PLANE).hb(mode=10)
+    flight.wait(2)
+    flight.hb(mode=16, state=2).wait(3)
+    assert flight.vehicle.boots == 1
+    assert {"INITIALISING"} <= flight.inhibits.keys()
+
+
+def test_a_reboot_long_after_an_armed_heartbeat_is_no_error() -> None:
+    flight = copter().hb(armed=True, state=ACTIVE)
+    flight.stop("heartbeat").wait(60)
+    flight.hb(armed=False, state=1)
+    assert (flight.vehicle.boots, flight.codes) == (1, [])
+
+
+def test_a_reboot_while_armed_is_told_by_a_heartbeat_alone() -> None:
+    flight = copter().hb(armed=True, state=ACTIVE)
+    flight.wait(5)
+    flight.hb(armed=False, state=1)
+    assert flight.codes == [5004]
+
+
+# -- SYS_STATUS --------------------------------------------------------------------------------------------------------
+
+
+def test_masks_of_zero_are_no_sys_status() -> None:
+    flight = px4().set(present=0, enabled=0, health=0)
+    flight.wait(3)
+    assert flight.status.in_error is UNKNOWN
+    assert "SYS_STATUS_MISSING" in flight.inhibits
+
+
+def test_internal_errors_count_on_ardupilot_only() -> None:
+    for vehicle, codes in ((copter, [5001]), (px4, [])):
+        flight = vehicle().set(internal_errors=0x10000)
+        flight.wait(2)
+        assert flight.codes == codes
+
+
+def test_a_text_of_internal_errors_is_over_when_the_counters_are_back_at_zero() -> None:
+    flight = copter().set(internal_errors=1)
+    flight.text("PreArm: Internal errors 0x1 l:1 x", 2).wait(2)
+    assert flight.codes == [5001]
+    flight.set(internal_errors=0).wait(2)
+    assert flight.codes == []
+
+
+def test_a_breached_fence_is_over_when_the_bit_is_healthy_again() -> None:
+    flight = copter().hb(armed=True, state=ACTIVE)
+    flight.set(present=flight.present | FENCE, enabled=flight.enabled | FENCE).wait(15)
+    assert flight.codes == [3020]
+    flight.text("Circle fence breached", 5)
+    assert flight.codes == [2009, 3020]
+    flight.set(health=flight.health | FENCE).wait(2)
+    assert flight.codes == []
+
+
+def test_sensors_that_the_site_knows_are_ignored() -> None:
+    flight = copter(options=HardwareOptions(ignore_sensors=frozenset({"3D_GYRO"}))).set(health=FITTED & ~GYRO)
+    flight.wait(20)
+    assert flight.codes == []
+
+
+def test_an_unhealthy_gps_is_an_error_only_while_armed() -> None:
+    flight = copter().set(health=(FITTED & ~GPS) | PREARM)
+    flight.wait(20)
+    assert flight.codes == []
+    assert flight.hb(armed=True, state=ACTIVE).codes == [3005]
+
+
+def test_an_inav_has_neither_ardupilots_texts_nor_its_counters_nor_its_stop() -> None:
+    flight = copter().set(present=FITTED & ~MOTORS, enabled=FITTED & ~MOTORS, internal_errors=7)
+    flight.wait(20)
+    flight.text("Radio Failsafe", 4).text("PreArm: Motors Emergency Stopped", 2)
+    assert flight.codes == []
+    assert flight.status.e_stopped is UNKNOWN
+
+
+# -- speed -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_vehicle_with_any_velocity_message_moves_or_does_not() -> None:
+    for message in (lambda f: here(f, 1, 0, 0), lambda f: local(f, 1, 0, 0), lambda f: hud(1, 0)):
+        flight = rover().hb(armed=True, state=ACTIVE)
+        assert moving(flight, lambda f=flight, m=message: m(f)) is TRUE
+    for message in (lambda f: here(f, 0, 0, 0), lambda f: local(f, 0, 0, 0), lambda f: hud(0, 0)):
+        flight = rover().hb(armed=True, state=ACTIVE)
+        assert moving(flight, lambda f=flight, m=message: m(f)) is FALSE
+
+
+def test_a_copter_that_climbs_straight_up_moves_a_rover_on_a_lift_does_not() -> None:
+    for vehicle, expected in ((copter, TRUE), (rover, FALSE)):
+        flight = vehicle().hb(armed=True, state=ACTIVE)
+        assert moving(flight, lambda f=flight: local(f, 0, 0, -1)) is expected
+        flight = vehicle().hb(armed=True, state=ACTIVE)
+        assert moving(flight, lambda: hud(0, 1)) is expected
+
+
+def test_a_velocity_of_exactly_zero_is_no_estimate_while_the_ahrs_is_unhealthy_or_without_a_position() -> None:
+    flight = rover().set(health=FITTED & ~AHRS | PREARM).hb(armed=True, state=ACTIVE)
+    assert moving(flight, lambda: here(flight, 0, 0, 0)) is UNKNOWN
+    assert moving(flight, lambda: hud(0, 0.3)) is UNKNOWN
+    flight = rover().hb(armed=True, state=ACTIVE)
+    assert moving(flight, lambda: here(flight, 0, 0, 0, lat=0)) is UNKNOWN
+    assert moving(flight, lambda: here(flight, 1, 0, 0, lat=0)) is TRUE
+
+
+def test_a_velocity_of_exactly_zero_is_believed_of_px4() -> None:
+    flight = px4().send(mav.ExtendedSysState(0, 1))
+    assert moving(flight, lambda: local(flight, 0, 0, 0)) is FALSE
+
+
+def test_what_a_disarmed_ardupilot_with_an_unhealthy_ahrs_measures_is_noise() -> None:
+    flight = rover().set(health=FITTED & ~AHRS | PREARM)
+    assert moving(flight, lambda: here(flight, 5, 0, 0)) is UNKNOWN
+
+
+def test_numbers_that_are_none_are_no_speed() -> None:
+    flight = px4()
+    assert moving(flight, lambda: local(flight, math.nan, 0, 0)) is UNKNOWN
+    assert moving(flight, lambda: local(flight, math.inf, 0, 0)) is UNKNOWN
+    assert moving(flight, lambda: hud(math.nan, 0)) is UNKNOWN
+
+
+def test_the_global_position_goes_before_the_local_one_and_that_before_the_hud() -> None:
+    flight = rover().hb(armed=True, state=ACTIVE)
+    flight.stream("global", lambda: here(flight, 0.01, 0, 0), hz=5)
+    flight.stream("local", lambda: local(flight, 5, 0, 0), hz=5).stream("hud", lambda: hud(9, 0), hz=5).wait(3)
+    assert flight.status.in_motion is FALSE
+    flight.stop("global").wait(4)
+    assert flight.status.in_motion is TRUE
+
+
+@pytest.mark.parametrize(("vehicle_type", "expected"), [(ROVER, TRUE), (11, FALSE)])
+def test_a_boat_that_only_rolls_does_not_move(vehicle_type: int, expected: TriState) -> None:
+    flight = Flight(vehicle_type=vehicle_type).hb(armed=True, state=ACTIVE)
+    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0, 0, 0, 0.5, math.nan, 0.0), hz=5)
+    assert moving(flight, lambda: here(flight, 0.01, 0, 0)) is expected
+
+
+def test_in_the_air_is_in_motion_while_armed_unless_the_site_says_otherwise() -> None:
+    for armed, hover, expected in ((True, True, TRUE), (False, True, FALSE), (True, False, FALSE)):
+        flight = px4(options=HardwareOptions(hover_is_motion=hover)).hb(armed=armed, state=ACTIVE)
+        flight.stream("landed", lambda: mav.ExtendedSysState(0, 2))
+        assert moving(flight, lambda f=flight: local(f, 0, 0, 0), 3) is expected
+
+
+def test_the_landed_state_of_a_rover_is_ignored() -> None:
+    flight = Flight(PX4, ROVER).hb(armed=True, state=ACTIVE)
+    flight.stream("landed", lambda: mav.ExtendedSysState(0, 2))
+    assert moving(flight, lambda: local(flight, 0, 0, 0), 3) is FALSE
+
+
+def test_an_armed_aircraft_of_which_nobody_knows_whether_it_flies_is_not_called_still() -> None:
+    flight = px4().hb(armed=True, state=ACTIVE)
+    assert moving(flight, lambda: local(flight, 0, 0, 0), 3) is UNKNOWN
+    flight = copter().hb(armed=True, state=STANDBY)
+    assert moving(flight, lambda: local(flight, 0, 0, 0), 3) is FALSE
+
+
+def test_a_speed_between_the_thresholds_is_a_speed_though_it_decides_nothing() -> None:
+    flight = px4()
+    flight.stream("landed", lambda: mav.ExtendedSysState(0, 1))
+    assert moving(flight, lambda: local(flight, 0.4, 0, 0)) is UNKNOWN
+    flight.stop("motion").wait(4)
+    assert flight.status.in_motion is FALSE
+
+
+# -- outputs -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        (b"SERVO3_FUNCTION", 33.0, {3: 33}),
+        (b"SERVO16_FUNCTION", 70.0, {16: 70}),
+        (b"SERVO33_FUNCTION", 33.0, {}),
+        (b"SERVO0_FUNCTION", 33.0, {}),
+        (b"SERVO3_FUNCTION", math.nan, {}),
+        (b"SERVO_FUNCTION", 1.0, {}),
+        (b"SERVOX_FUNCTION", 1.0, {}),
+        (b"SERVO3_MIN", 1000.0, {}),
+        (b"", 1.0, {}),
+    ],
+)
+def test_the_functions_of_the_outputs_are_taken_from_the_parameters(
+    name: bytes, value: float, expected: dict[int, int]
+) -> None:
+    flight = copter().send(mav.ParamValue(value, 0, 0, name, 2))
+    assert memory_of(flight).watch.functions == expected
+
+
+@pytest.mark.parametrize(
+    "telemetry",
+    [
+        mav.EscTelemetry1To4(b"", b"", b"", pack("<4H", 0, 0, 900, 0), b"", b""),
+        mav.EscTelemetry9To12(b"", b"", b"", pack("<4H", 1, 0, 0, 0), b"", b""),
+        mav.EscStatus(0, pack("<4i", 0, -900, 0, 0), b"", b"", 0),
+    ],
+)
+def test_a_motor_that_turns_is_not_stopped(telemetry: Any) -> None:
+    flight = copter().hb(armed=True, state=ACTIVE).send(telemetry)
+    assert flight.status.e_stopped is FALSE
+    flight.wait(3)
+    assert flight.status.e_stopped is UNKNOWN
+
+
+def test_motors_at_rest_say_nothing() -> None:
+    flight = copter().hb(armed=True, state=ACTIVE)
+    flight.send(mav.EscTelemetry1To4(b"", b"", b"", bytes(8), b"", b""))
+    assert flight.status.e_stopped is UNKNOWN
+
+
+def test_outputs_are_not_watched_if_the_site_does_not_want_it() -> None:
+    flight = copter(options=HardwareOptions(watch_outputs=False))
+    flight.send(mav.ServoOutputRaw._make((0, *[1000] * 8, 0, *[0] * 8)))
+    assert memory_of(flight).watch.values == ()
+
+
+# -- modes -------------------------------------------------------------------------------------------------------------
+
+
+def test_available_modes_give_names_and_current_mode_the_standard_mode() -> None:
+    flight = Flight(autopilot=0).hb(mode=3, flags=0x51)
+    assert (flight.status.mode, flight.detail.vehicle.flight_mode) == (RobotMode.MANUAL, "CMODE(3)")
+    flight.send(mav.AvailableModes(3, 0, 8, 3, 6, b"Autopilot"))
+    assert (flight.status.mode, flight.detail.vehicle.flight_mode) == (RobotMode.AUTO, "Autopilot")
+    flight.send(mav.CurrentMode(3, 3, 4))
+    assert flight.status.mode is RobotMode.MANUAL
+    assert flight.wait(6)[-1].mode is RobotMode.AUTO
+
+
+# -- texts and events --------------------------------------------------------------------------------------------------
+
+
+def test_a_reason_not_to_arm_is_over_when_the_checks_pass() -> None:
+    flight = copter().set(health=FITTED)
+    flight.text("PreArm: Compass not calibrated", 2).wait(2)
+    assert flight.inhibits["PREARM_FAILING"] == "PreArm: Compass not calibrated"
+    flight.set(health=FITTED | PREARM).wait(2)
+    assert "PREARM_FAILING" not in flight.inhibits
+    flight.set(health=FITTED).wait(2)
+    assert flight.inhibits["PREARM_FAILING"] is None
+
+
+def test_an_event_that_is_repeated_is_one_event() -> None:
+    flight = px4().hb(armed=True, state=ACTIVE)
+    event = mav.Event(1, 0, 9, 0, 0, 0x42, b"")
+    flight.send(event).wait(9)
+    flight.send(event).wait(2)
+    assert flight.codes == []
+
+
+def test_events_of_other_autopilots_say_nothing() -> None:
+    assert copter().hb(armed=True, state=ACTIVE).event(0x42).codes == []
+
+
+def test_a_named_emergency_is_its_name_and_an_unnamed_one_4000() -> None:
+    flight = copter().hb(armed=True, state=EMERGENCY)
+    assert flight.codes == [4000]
+    assert flight.text("Crash detected", 0).codes == [4001]
+
+
+def test_states_of_failsafe_are_dated_from_their_beginning() -> None:
+    flight = copter().hb(armed=True, state=CRITICAL)
+    since = flight.detail.errors[0].since_us
+    flight.wait(5)
+    assert flight.detail.errors[0].since_us == since

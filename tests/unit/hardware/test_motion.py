@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+import pytest
+
+from mav_robot_status.hardware.motion import UNKNOWN, Motion, moved, settle
+from mav_robot_status.hardware.options import HardwareOptions
+from mav_robot_status.interface import TriState
+
+OPTIONS = HardwareOptions()
+
+
+def driven(*samples: tuple[float, float | None], armed: bool = True, rate: float = 0.0) -> Motion:
+    """The motion after (time, speed) samples."""
+    motion = UNKNOWN
+    for at, speed in samples:
+        motion = moved(motion, speed, rate, armed, OPTIONS, at)
+    return motion
+
+
+def test_motion_begins_when_it_has_been_fast_for_three_tenths_of_a_second() -> None:
+    fast = driven((0, 0.31))
+    assert settle(fast, 0.29).value is TriState.UNKNOWN
+    assert settle(fast, 0.3).value is TriState.TRUE
+
+
+def test_motion_ends_when_it_has_been_slow_for_a_second() -> None:
+    slow = driven((0, 1.0), (1, 1.0), (2, 0.14))
+    assert settle(slow, 2.9).value is TriState.TRUE
+    assert settle(slow, 3.0).value is TriState.FALSE
+
+
+def test_between_the_thresholds_the_value_stays() -> None:
+    assert driven((0, 1.0), (1, 1.0), (2, 0.2), (9, 0.2)).value is TriState.TRUE
+    assert driven((0, 0.0), (2, 0.0), (3, 0.2), (9, 0.2)).value is TriState.FALSE
+    assert driven((0, 0.2), (9, 0.2)).value is TriState.UNKNOWN
+
+
+def test_one_slow_sample_interrupts_a_beginning_motion() -> None:
+    assert settle(driven((0, 0.4), (0.2, 0.2), (0.4, 0.4)), 0.6).value is TriState.UNKNOWN
+
+
+def test_a_sample_without_an_estimate_forgets_all() -> None:
+    assert driven((0, 1.0), (1, 1.0), (2, None)) == UNKNOWN
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(0.45, TriState.FALSE), (0.55, TriState.TRUE)])
+def test_a_disarmed_vehicle_has_higher_thresholds(speed: float, expected: TriState) -> None:
+    moving = driven((0, 0.0), (2, 0.0), (3, speed), armed=False)
+    assert settle(moving, 4).value is expected
+
+
+def test_turning_on_the_spot_is_motion() -> None:
+    assert settle(driven((0, 0.0), rate=0.16), 0.3).value is TriState.TRUE
+    assert settle(driven((0, 0.0), rate=0.10), 5.0).value is TriState.UNKNOWN
+    assert settle(driven((0, 0.0), rate=0.07), 1.0).value is TriState.FALSE
+
+
+def test_thresholds_are_options() -> None:
+    options = HardwareOptions(v_on=2.0, v_off=1.0)
+    assert settle(moved(UNKNOWN, 1.5, 0.0, True, options, 0), 9).value is TriState.UNKNOWN
+    assert settle(moved(UNKNOWN, 0.9, 0.0, True, options, 0), 9).value is TriState.FALSE

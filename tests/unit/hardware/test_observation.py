@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import pytest
+
+from mav_robot_status.hardware.observation import Heard, heard, interval, is_fresh
+
+
+def arrivals(*times: float) -> Heard:
+    last: Heard | None = None
+    for at in times:
+        last = heard("message", at, last)
+    assert last is not None
+    return last
+
+
+def test_what_was_never_heard_is_not_fresh() -> None:
+    assert not is_fresh(None, 10.0, 5.0)
+
+
+def test_a_message_is_fresh_for_as_long_as_asked_the_end_included() -> None:
+    once = arrivals(10.0)
+    assert is_fresh(once, 12.5, 2.5)
+    assert not is_fresh(once, 12.6, 2.5)
+
+
+def test_a_slow_stream_is_fresh_for_three_of_its_intervals() -> None:
+    slow = arrivals(0.0, 2.0, 4.0, 6.0)
+    assert is_fresh(slow, 12.0, 2.5)
+    assert not is_fresh(slow, 12.1, 2.5)
+
+
+def test_a_very_slow_stream_is_fresh_for_ten_seconds() -> None:
+    slow = arrivals(0.0, 30.0, 60.0)
+    assert is_fresh(slow, 70.0, 2.5)
+    assert not is_fresh(slow, 70.1, 2.5)
+
+
+def test_a_longer_time_asked_for_outlasts_the_ten_seconds() -> None:
+    assert is_fresh(arrivals(0.0), 30.0, 60.0)
+
+
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [((0.0,), 0.0), ((0.0, 1.0), 1.0), ((0, 1, 2, 3, 4, 5, 105), 1), ((0, 100, 101, 102, 103, 104, 105), 1)],
+)
+def test_the_interval_is_the_median_of_the_last_five(times: tuple[float, ...], expected: float) -> None:
+    assert interval(arrivals(*times)) == expected
+
+
+def test_only_the_last_arrivals_are_remembered() -> None:
+    assert arrivals(*range(20)).times == (14, 15, 16, 17, 18, 19)

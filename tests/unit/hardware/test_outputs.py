@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+import pytest
+
+from mav_robot_status.clock import Instant, later
+from mav_robot_status.hardware.identity import family_of
+from mav_robot_status.hardware.outputs import NOT_WATCHED, Watch, channels, heard_beat, heard_outputs, verdict
+from mav_robot_status.hardware.pulse import Pulse, first_beat, next_beat
+from mav_robot_status.interface import TriState
+from mav_robot_status.mavlink.definitions import Heartbeat
+
+NOW = Instant(1000.0, 1_800_000_000_000_000)
+QUAD, HELI, PLANE, ROVER, SUB = 2, 4, 1, 10, 12
+STOP, FLYING = (1000,) * 4, (1632,) * 4
+
+
+class Machine:
+    """Heartbeats and outputs of one vehicle; each takes half a second."""
+
+    def __init__(self, vehicle_type: int = QUAD, functions: dict[int, int] | None = None) -> None:
+        self.type, self.watch = vehicle_type, Watch(functions=functions or {})
+        self.now = NOW
+        self.pulse: Pulse | None = None
+
+    def beat(self, armed: bool, enabled: bool = True, seconds: float = 0.5) -> Machine:
+        self.now = later(self.now, seconds)
+        before = self.pulse
+        heartbeat = Heartbeat(0, self.type, 3, 0x81 if armed else 1, 4, 3)
+        after = next_beat(before, heartbeat, self.now, True) if before else first_beat(heartbeat, self.now)
+        self.pulse = after
+        self.watch = heard_beat(self.watch, after, before, enabled, self.type, self.now.mono)
+        return self
+
+    def put(self, values: tuple[int, ...], throttle: float | None = 50, speed: float = 0.0) -> Machine:
+        self.now = later(self.now, 0.5)
+        assert self.pulse is not None
+        padded = (*values, *(0,) * 16)[:16]
+        self.watch = heard_outputs(self.watch, padded, self.type, self.pulse, throttle, speed, self.now.mono)
+        return self
+
+    def learn(self, values: tuple[int, ...] = STOP) -> Machine:
+        return self.beat(False).put(values).beat(False)
+
+    def fly(self, values: tuple[int, ...] = FLYING) -> Machine:
+        return self.beat(True).put(values)
+
+    def judge(self, speed: float = 0.0, after: float = 0.0) -> TriState:
+        return verdict(self.watch, family_of(self.type), self.type, speed, self.now.mono + after)
+
+
+def test_a_motor_off_its_stop_value_is_driven() -> None:
+    assert Machine().learn().fly().judge() is TriState.FALSE
+
+
+def test_outputs_back_at_stop_under_throttle_are_held_after_a_second() -> None:
+    machine = Machine().learn().fly().put(STOP)
+    assert machine.judge(after=0.9) is TriState.UNKNOWN
+    assert machine.judge(after=1.0) is TriState.TRUE
+
+
+def test_without_throttle_outputs_at_stop_say_nothing() -> None:
+    assert Machine().learn().fly().put(STOP, throttle=14).judge(after=9) is TriState.UNKNOWN
+    assert Machine().learn().fly().put(STOP, throttle=None).judge(after=9) is TriState.UNKNOWN
+
+
+def test_outputs_that_never_left_their_stop_value_since_arming_are_not_held() -> None:
+    machine = Machine().learn().fly()
+    machine.beat(False).put(STOP).beat(False)
+    assert machine.beat(True).put(STOP).judge(after=9) is TriState.UNKNOWN
+
+
+def test_an_assumed_channel_says_nothing_until_throttle_has_moved_it() -> None:
+    one_off = (1632, 1000, 1000, 1000)
+    assert Machine().learn().beat(True).put(one_off, throttle=0).judge() is TriState.UNKNOWN
+    assert Machine().learn().beat(True).put(one_off, throttle=20).judge() is TriState.FALSE
+    known = Machine(functions={n: 32 + n for n in (1, 2, 3, 4)}).learn().beat(True)
+    assert known.put(one_off, throttle=0).judge() is TriState.FALSE
+
+
+def test_several_assumed_channels_that_all_leave_their_stop_value_are_motors() -> None:
+    assert Machine().learn().beat(True).put(FLYING, throttle=0).judge() is TriState.FALSE
+
+
+def test_a_speed_that_grows_vetoes() -> None:
+    copter = Machine().learn().fly().put(STOP)
+    assert copter.judge(speed=0.6, after=2) is TriState.UNKNOWN
+    assert copter.judge(speed=-3.0, after=2) is TriState.TRUE
+    rover = Machine(ROVER).learn((1500, 0, 1500)).fly((1500, 0, 1655)).put((1500, 0, 1500), speed=2.0)
+    assert rover.judge(speed=2.2, after=2) is TriState.TRUE
+    assert rover.judge(speed=2.6, after=2) is TriState.UNKNOWN
+
+
+@pytest.mark.parametrize("vehicle_type", [HELI, PLANE, SUB])
+def test_only_multirotors_and_rovers_are_ever_held(vehicle_type: int) -> None:
+    functions = {1: 31} if vehicle_type == HELI else {1: 33}
+    machine = Machine(vehicle_type, functions).learn().fly()
+    assert machine.judge() is TriState.FALSE
+    assert machine.put(STOP).judge(after=9) is TriState.UNKNOWN
+
+
+def test_a_stop_value_is_learnt_only_between_two_near_disarmed_heartbeats_with_outputs_enabled() -> None:
+    assert set(Machine().learn().watch.stop.values()) == {1000}
+    assert Machine().beat(False).put(STOP).beat(False, enabled=False).watch.stop == {}
+    assert Machine().beat(False).put(STOP).beat(False, seconds=4).watch.stop == {}
+    assert Machine().beat(False).put(STOP).beat(True).watch.stop == {}
+    assert Machine().beat(True).put(STOP).beat(False).beat(False).watch.stop == {}
+
+
+def test_an_output_that_is_switched_off_teaches_nothing() -> None:
+    assert Machine().learn((0, 0, 0, 0)).watch.stop == {}
+    assert Machine().learn((0, 0, 0, 0)).fly().judge() is TriState.UNKNOWN
+
+
+def test_disarming_ends_what_the_outputs_said() -> None:
+    machine = Machine().learn().fly().put(STOP).beat(False).put(STOP)
+    assert machine.judge(after=9) is TriState.UNKNOWN
+
+
+def test_channels_come_from_the_parameters_and_else_from_the_type() -> None:
+    assert channels(NOT_WATCHED, QUAD) == ((1, 2, 3, 4), True)
+    assert channels(NOT_WATCHED, ROVER) == ((3,), True)
+    assert channels(NOT_WATCHED, PLANE) == ((), True)
+    skid = Watch(functions={1: 73, 2: 0, 3: 74})
+    assert channels(skid, ROVER) == ((1, 3), False)
+    assert channels(Watch(functions={1: 33, 8: 31}), HELI) == ((8,), False)

@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+import logging
+import math
+
+import pytest
+
+from mav_robot_status.hardware.options import HardwareOptions
+from mav_robot_status.hardware.robot_hw import MOST_VEHICLES, MavlinkRobotHW, Slot
+from mav_robot_status.interface import LinkState, RobotStatus, TriState
+from mav_robot_status.mavlink import definitions as mav
+from mav_robot_status.testing import ManualClock
+
+from .driver import Flight, copter, frame_of, px4
+
+BEAT = mav.Heartbeat(4, 2, 3, 129, 4, 3)
+NAME = "industrial_robot_status_handle"
+
+
+def hear(hw: MavlinkRobotHW, *ids: tuple[int, int]) -> None:
+    clock = ManualClock()
+    for one in ids:
+        hw.take(frame_of(BEAT, one), clock.now())
+    hw.read(clock.now())
+
+
+def test_without_configuration_every_autopilot_becomes_a_handle() -> None:
+    hw = MavlinkRobotHW()
+    assert hw.handles.get_names() == []
+    hear(hw, (7, 1), (8, 5))
+    assert hw.handles.get_names() == [NAME, f"{NAME}/8.5"]
+
+
+def test_configured_vehicles_have_their_handles_from_the_start_and_others_are_counted() -> None:
+    hw = MavlinkRobotHW(slots=[Slot(1, None, "left"), Slot(2, None, "right")])
+    assert hw.handles.get_names() == ["left", "right"]
+    assert hw.handles.get_handle("left").detail.link is LinkState.NEVER_SEEN
+    hear(hw, (2, 1), (3, 1), (3, 1))
+    assert hw.handles.get_handle("right").detail.link is LinkState.CONNECTED
+    assert hw.handles.get_handle("left").detail.link is LinkState.NEVER_SEEN
+    assert hw.ignored == 2
+
+
+def test_a_vehicle_that_is_named_exactly_goes_before_one_that_is_not() -> None:
+    hw = MavlinkRobotHW(slots=[Slot(None, None, "any"), Slot(5, None, "five")])
+    hear(hw, (5, 1), (6, 1))
+    assert hw.handles.get_handle("five").detail.system == 5
+    assert hw.handles.get_handle("any").detail.system == 6
+
+
+def test_a_handle_stays_with_its_vehicle() -> None:
+    hw = MavlinkRobotHW(slots=[Slot()])
+    hear(hw, (5, 1), (6, 1))
+    assert hw.handles.get_handle(NAME).detail.system == 5
+
+
+def test_the_number_of_vehicles_is_bounded() -> None:
+    hw = MavlinkRobotHW()
+    hear(hw, *((n % 250 + 1, n // 250 + 1) for n in range(MOST_VEHICLES + 10)))
+    assert len(list(hw.vehicles)) == MOST_VEHICLES
+    assert hw.ignored == 10
+
+
+def test_only_heartbeats_of_autopilots_are_told_to_the_caller() -> None:
+    flight = copter()
+    now = flight.clock.now()
+    assert flight.hw.take(frame_of(BEAT), now) is flight.vehicle
+    assert flight.hw.take(frame_of(flight.sys_status()), now) is None
+    assert flight.hw.take(frame_of(BEAT._replace(type=6, autopilot=8)), now) is None
+    assert flight.hw.take(frame_of(BEAT._replace(type=6, autopilot=8), (255, 190)), now) is None
+
+
+def test_nothing_is_due_before_anything_was_heard_and_after_the_loss() -> None:
+    hw = MavlinkRobotHW()
+    assert hw.next_due() == math.inf
+    flight = copter(streams=False).hb()
+    assert flight.hw.next_due() <= flight.clock.now().mono + 3.5001
+    flight.wait(5)
+    assert flight.detail.link is LinkState.LOST
+    assert flight.hw.next_due() == math.inf
+
+
+def test_the_loss_is_noticed_when_it_is_due_and_not_before() -> None:
+    flight = copter(streams=False).hb()
+    lost_at = None
+    for _ in range(100):
+        flight.hw.read(flight.clock.now())
+        if flight.detail.link is LinkState.LOST:
+            lost_at = flight.clock.now().mono
+            break
+        flight.clock.advance(max(flight.hw.next_due() - flight.clock.now().mono, 1e-6))
+        flight.hw.write(flight.clock.now())
+    assert lost_at == pytest.approx(1003.5, abs=1e-3)
+
+
+def test_a_loss_and_a_return_are_one_log_line_each(caplog: pytest.LogCaptureFixture) -> None:
+    flight = copter()
+    with caplog.at_level(logging.INFO):
+        flight.hb().stop().wait(10)
+        flight.resume().wait(10)
+    lines = [record.message for record in caplog.records if "vehicle 1.1" in record.message]
+    assert [line for line in lines if "asking" not in line] == [
+        "heard vehicle 1.1 (ARDUPILOTMEGA, QUADROTOR): handle 'industrial_robot_status_handle'",
+        "lost vehicle 1.1: no heartbeat for 3.5 s",
+        "vehicle 1.1 is back",
+    ]
+
+
+def test_a_lost_link_is_an_error_only_where_the_site_says_so_and_keeps_its_date() -> None:
+    flight = copter(options=HardwareOptions(link_loss_is_error=True))
+    flight.hb().stop().wait(4)
+    assert flight.status == RobotStatus(in_error=TriState.TRUE, error_code=9001)
+    since = flight.detail.errors[0].since_us
+    flight.text("still talking", 6).wait(10)
+    flight.text("still talking", 6)
+    assert flight.detail.errors[0].since_us == since
+
+
+def test_a_new_segment_begins_as_if_nothing_had_been_heard(caplog: pytest.LogCaptureFixture) -> None:
+    flight = Flight().stream("system_time", lambda: flight.system_time())
+    flight.wait(3)
+    flight.reboot().wait(3)
+    assert flight.vehicle.boots == 1
+    flight.hw.forget()
+    handle = flight.vehicle.handle
+    assert (handle.status, handle.detail.link, handle.heard_at) == (RobotStatus(), LinkState.NEVER_SEEN, None)
+    flight.hw.read(flight.clock.now())
+    assert (handle.status, handle.detail.link, handle.heard_at) == (RobotStatus(), LinkState.NEVER_SEEN, None)
+    caplog.clear()
+    with caplog.at_level(logging.INFO):
+        flight.hb()
+    assert (flight.status.drives_powered, flight.vehicle.boots) == (TriState.FALSE, 0)
+    assert "rebooted" not in caplog.text
+
+
+def test_a_frame_of_mavlink_1_is_heard_like_one_of_mavlink_2() -> None:
+    flight = px4(streams=False)
+    flight.hw.take(frame_of(BEAT, version=1), flight.clock.now())
+    flight.look()
+    assert flight.status.drives_powered is TriState.TRUE

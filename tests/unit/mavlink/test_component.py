@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from mav_robot_status.mavlink.component import COMPONENTS, REMEMBERED, Component
+from mav_robot_status.mavlink.definitions import Heartbeat
+from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.framing import Frame, Parser
+
+
+def parsed(data: bytes) -> Frame:
+    (frame,) = Parser({0}).feed(data)
+    return frame
+
+
+def foreign(component: int, system: int = 1, sequence: int = 200) -> Frame:
+    return parsed(encode(Heartbeat(0, 18, 8, 0, 4, 3), system=system, component=component, sequence=sequence))
+
+
+def speaker(component: Component, system: int = 1) -> tuple[int, int]:
+    frame = parsed(component.heartbeat(system))
+    return frame.system, frame.component
+
+
+def test_our_heartbeat_is_a_companions_and_mirrors_the_error() -> None:
+    component = Component()
+    calm, alarmed = parsed(component.heartbeat(7)), parsed(component.heartbeat(7, in_error=True))
+    assert (calm.system, calm.component, calm.sequence, alarmed.sequence) == (7, 192, 0, 1)
+    assert (calm.payload[4], calm.payload[5], calm.payload[7]) == (18, 8, 4)
+    assert alarmed.payload[7] == 5
+
+
+def test_a_system_of_our_own_may_be_configured() -> None:
+    component = Component(100, system=245)
+    assert speaker(component, 7) == (245, 100)
+    assert component.system_for(9) == 245
+
+
+def test_sequences_are_counted_for_each_system() -> None:
+    component = Component()
+    assert [parsed(component.heartbeat(s)).sequence for s in (1, 2, 1, 2)] == [0, 0, 1, 1]
+
+
+def test_another_program_with_our_component_makes_us_take_the_next() -> None:
+    component = Component()
+    taken = [speaker(component)[1]]
+    for _ in range(3):
+        component.heard(foreign(taken[-1]))
+        taken.append(speaker(component)[1])
+    assert taken == list(COMPONENTS)
+
+
+def test_one_that_spoke_before_us_is_kept_out_of_its_way_from_the_first_frame() -> None:
+    component = Component()
+    component.heard(foreign(192))
+    component.heard(foreign(193))
+    assert speaker(component) == (1, 194)
+
+
+def test_if_all_are_taken_we_stay_and_say_so_once(caplog: pytest.LogCaptureFixture) -> None:
+    component = Component()
+    speaker(component)
+    for sequence in range(100):
+        for number in COMPONENTS:
+            component.heard(foreign(number, sequence=sequence + 100))
+    last = component.id
+    assert last in COMPONENTS
+    assert len([r for r in caplog.records if r.levelno == logging.WARNING]) == 4
+
+
+def test_another_in_a_system_that_we_do_not_speak_for_is_no_matter() -> None:
+    component = Component()
+    speaker(component, 1)
+    component.heard(foreign(192, system=2))
+    assert speaker(component, 1) == (1, 192)
+
+
+def test_an_echo_of_our_own_heartbeats_is_no_other_program() -> None:
+    component = Component()
+    sent = [parsed(component.heartbeat(system)) for _ in range(REMEMBERED) for system in range(1, 255)]
+    for frame in sent:
+        component.heard(frame)
+    assert component.id == 192
+
+
+def test_a_late_echo_from_before_the_change_is_still_our_own() -> None:
+    component = Component()
+    before = parsed(component.heartbeat(1))
+    component.heard(foreign(192))
+    component.heartbeat(1)
+    component.heard(before)
+    assert component.id == 193
+
+
+def test_what_is_remembered_of_others_is_bounded() -> None:
+    component = Component()
+    for system in range(1, 256):
+        for number in range(256):
+            component.heard(foreign(number, system))
+    assert len(component._others) <= 255 * len(COMPONENTS)

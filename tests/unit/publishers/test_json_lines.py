@@ -1,0 +1,224 @@
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_robot_status.clock import Instant
+from mav_robot_status.errors import LinkError, UsageError
+from mav_robot_status.interface import (
+    Detail,
+    ErrorCause,
+    Inhibit,
+    LinkState,
+    PublisherContext,
+    RobotMode,
+    RobotStatus,
+    RobotStatusMsg,
+    TriState,
+    Vehicle,
+)
+from mav_robot_status.publishers.json_lines import PIPE_BUF, JsonLinesPublisher
+
+STAMP = 1_795_200_547_123_456
+NOW = Instant(10.0, STAMP)
+STATUS = RobotStatus(
+    RobotMode.AUTO, TriState.UNKNOWN, TriState.TRUE, TriState.FALSE, TriState.TRUE, TriState.TRUE, 2001
+)
+DETAIL = Detail(
+    1,
+    1,
+    (ErrorCause(2001, "RADIO_FAILSAFE", "Radio Failsafe", STAMP), ErrorCause(3005, "SENSOR_GPS", None, STAMP)),
+    (Inhibit(2, "E_STOPPED", None, STAMP),),
+    Vehicle("ARDUPILOTMEGA", "GROUND_ROVER", "GUIDED", 15, "ACTIVE"),
+)
+MSG = RobotStatusMsg("robot", STAMP, STATUS, DETAIL, 0.4124)
+
+
+class Nobody:
+    def send(self, message: Any, system: int) -> None:
+        raise AssertionError("JSON lines are not MAVLink")
+
+
+class Pipe:
+    """A standard output with a reader that reads when told to."""
+
+    def __init__(self) -> None:
+        self.read_end, self.write_end = os.pipe()
+        os.set_blocking(self.read_end, False)
+        self.stdout = os.fdopen(self.write_end, "w", encoding="utf-8")
+
+    def read(self) -> bytes:
+        data = b""
+        try:
+            while piece := os.read(self.read_end, 1 << 16):
+                data += piece
+        except BlockingIOError:
+            pass
+        return data
+
+    def leave(self) -> None:
+        if self.read_end >= 0:
+            os.close(self.read_end)
+            self.read_end = -1
+
+
+@pytest.fixture
+def pipe() -> Iterator[Pipe]:
+    made = Pipe()
+    yield made
+    made.leave()
+    made.stdout.close()
+
+
+def on(pipe: Pipe, patient: bool = False, **options: Any) -> JsonLinesPublisher:
+    return JsonLinesPublisher(PublisherContext(options, Nobody(), pipe.stdout, patient))
+
+
+def test_a_native_line_is_as_the_contract_says(pipe: Pipe) -> None:
+    on(pipe).publish(MSG)
+    stamp = "2026-11-20T18:49:07.123456Z"
+    assert json.loads(pipe.read()) == {
+        "stamp": stamp,
+        "seq": 0,
+        "handle": "robot",
+        "system": 1,
+        "component": 1,
+        "mode": "AUTO",
+        "e_stopped": None,
+        "drives_powered": True,
+        "motion_possible": False,
+        "in_motion": True,
+        "in_error": True,
+        "error_code": 2001,
+        "errors": [
+            {"code": 2001, "name": "RADIO_FAILSAFE", "text": "Radio Failsafe", "since": stamp},
+            {"code": 3005, "name": "SENSOR_GPS", "text": None, "since": stamp},
+        ],
+        "inhibits": [{"name": "E_STOPPED", "text": None, "since": stamp}],
+        "vehicle": {
+            "autopilot": "ARDUPILOTMEGA",
+            "type": "GROUND_ROVER",
+            "flight_mode": "GUIDED",
+            "custom_mode": 15,
+            "state": "ACTIVE",
+        },
+        "link": {"state": "CONNECTED", "heartbeat_age": 0.412},
+    }
+
+
+def test_the_ros_1_form(pipe: Pipe) -> None:
+    on(pipe, format="ros1").publish(MSG)
+    assert json.loads(pipe.read()) == {
+        "header": {"seq": 0, "stamp": {"secs": 1795200547, "nsecs": 123456000}, "frame_id": "robot"},
+        "mode": {"val": 2},
+        "e_stopped": {"val": -1},
+        "drives_powered": {"val": 1},
+        "motion_possible": {"val": 0},
+        "in_motion": {"val": 1},
+        "in_error": {"val": 1},
+        "error_code": 2001,
+    }
+
+
+def test_the_ros_2_form_lists_every_code(pipe: Pipe) -> None:
+    publisher = on(pipe, format="ros2")
+    publisher.publish(MSG)
+    publisher.publish(MSG._replace(detail=DETAIL._replace(errors=())))
+    publisher.publish(MSG._replace(status=RobotStatus(), detail=Detail()))
+    codes = [json.loads(line)["error_codes"] for line in pipe.read().splitlines()]
+    assert codes == [[2001, 3005], [2001], []]
+
+
+def test_each_handle_is_counted_for_itself_and_a_negative_age_is_none(pipe: Pipe) -> None:
+    publisher = on(pipe)
+    for handle, age in (("a", -0.01), ("b", None), ("a", 1.0)):
+        publisher.publish(MSG._replace(handle=handle, heartbeat_age=age))
+    lines = [json.loads(line) for line in pipe.read().splitlines()]
+    assert [(x["handle"], x["seq"], x["link"]["heartbeat_age"]) for x in lines] == [
+        ("a", 0, 0.0), ("b", 0, None), ("a", 1, 1.0),
+    ]  # fmt: skip
+
+
+def test_a_new_status_or_detail_is_written_though_the_last_was_kept(pipe: Pipe) -> None:
+    publisher = on(pipe)
+    publisher.publish(MSG)
+    publisher.publish(MSG._replace(status=RobotStatus()))
+    publisher.publish(MSG._replace(status=RobotStatus(), detail=Detail(link=LinkState.LOST)))
+    modes = [(json.loads(x)["mode"], json.loads(x)["link"]["state"]) for x in pipe.read().splitlines()]
+    assert modes == [("AUTO", "CONNECTED"), ("UNKNOWN", "CONNECTED"), ("UNKNOWN", "LOST")]
+
+
+def test_a_full_pipe_is_busy_and_goes_on_where_it_was(pipe: Pipe) -> None:
+    publisher = on(pipe)
+    long_text = ErrorCause(1, "X", "x" * 10_000, STAMP)
+    msg = MSG._replace(detail=DETAIL._replace(errors=(long_text,)))
+    published = 0
+    while not publisher.busy():
+        publisher.publish(msg)
+        published += 1
+        assert published < 100
+    assert publisher.service(NOW) == pytest.approx(NOW.mono + 0.005)
+    data = pipe.read()
+    while publisher.service(NOW) is not None:
+        data += pipe.read()
+    data += pipe.read()
+    assert not publisher.busy()
+    assert [json.loads(line)["seq"] for line in data.splitlines()] == list(range(published))
+    assert max(map(len, data.splitlines())) > PIPE_BUF
+
+
+def test_a_reader_that_has_gone_is_noticed_when_writing_and_when_idle(pipe: Pipe) -> None:
+    publisher = on(pipe)
+    assert publisher.service(NOW) is None
+    pipe.leave()
+    with pytest.raises(BrokenPipeError):
+        publisher.busy()
+    assert publisher.service(Instant(NOW.mono + 0.5, 0)) is None  # not looked at each time
+    with pytest.raises(BrokenPipeError):
+        publisher.service(Instant(NOW.mono + 1.0, 0))
+
+
+def test_on_replay_nothing_is_lost_and_lines_go_out_at_the_end(pipe: Pipe) -> None:
+    publisher = on(pipe, patient=True)
+    for _ in range(50):
+        assert not publisher.busy()
+        publisher.publish(MSG)
+    publisher.close()
+    assert len(pipe.read().splitlines()) == 50
+
+
+def test_a_file_is_appended_to_and_closed(tmp_path: Path) -> None:
+    path = tmp_path / "lines"
+    for _ in range(2):
+        publisher = JsonLinesPublisher(PublisherContext({"path": str(path)}, Nobody(), io.StringIO()))
+        publisher.publish(MSG)
+        publisher.close()
+    assert len(path.read_text("utf-8").splitlines()) == 2
+
+
+def test_a_full_disk_is_an_error_for_the_person() -> None:
+    publisher = JsonLinesPublisher(PublisherContext({"path": "/dev/full"}, Nobody(), io.StringIO()))
+    with pytest.raises(LinkError, match="cannot write JSON lines to /dev/full: No space left on device"):
+        publisher.publish(MSG)
+    publisher._rest = b""
+    publisher.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [({"format": "xml"}, "'xml' is none of native, ros1, ros2"), ({"colour": 1}, "unknown option 'colour'")],
+)
+def test_wrong_options_are_errors_for_the_person(pipe: Pipe, options: dict[str, Any], says: str) -> None:
+    with pytest.raises(UsageError, match=says):
+        on(pipe, **options)
+
+
+def test_changes_only_wants_no_periodic_lines(pipe: Pipe) -> None:
+    assert on(pipe).periodic
+    assert not on(pipe, changes_only=True).periodic

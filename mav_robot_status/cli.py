@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 from . import __version__
 from .config import Config, ControllerConfig, LinkConfig, PublisherConfig, VehicleConfig, describe
 from .config import load as load_config
-from .errors import MavRobotStatusError, UsageError
+from .errors import MavRobotStatusError, NothingHeardError, UsageError
 from .interface import DEFAULT_HANDLE_NAME
 from .link.url import help_text, parse
 from .streams import StderrHandler, complain, detach, open_missing
@@ -78,6 +78,27 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def explain(options: argparse.Namespace) -> int:
+    """Why each field has its value, now or at a moment of a log."""
+    _log_to_stderr(options)
+    from .gateway.explain import as_json, as_table, explain_live, explain_log
+
+    config = overridden(load_config(options.config) if options.config else Config(), options)
+    urls = [parse(link.url) for link in config.links]
+    if not urls:
+        raise UsageError(f"no connection given; write for example {PROGRAM} explain udp:127.0.0.1:14550")
+    if len(urls) == 1 and urls[0].kind == "log":
+        found = explain_log(config, urls[0].device, options.at)
+    elif options.at is not None:
+        raise UsageError("--at is a moment of a recorded log; a live connection is explained now")
+    else:
+        found = explain_live(config, sys.stdout)
+    if not found:
+        raise NothingHeardError("no autopilot was heard, so there is nothing to explain")
+    print(as_json(found) if options.as_json else as_table(found))  # noqa: T201
+    return 0
+
+
 def demo(options: argparse.Namespace) -> int:
     """A fake autopilot and the gateway, in one process."""
     _log_to_stderr(options)
@@ -108,6 +129,7 @@ def dialect(options: argparse.Namespace) -> int:
 
 COMMANDS: Final[dict[str, Callable[[argparse.Namespace], int]]] = {
     "run": run,
+    "explain": explain,
     "demo": demo,
     "check-config": check_config,
     "dialect": dialect,
@@ -206,6 +228,22 @@ def _parser() -> argparse.ArgumentParser:
     runs.add_argument("--baud", type=_baud, metavar="N", help="baud rate of serial connections (57600)")
     runs.add_argument("--passive", action="store_true", help="never send anything on the vehicle links")
     _verbosity(runs)
+
+    explains = commands.add_parser(
+        "explain",
+        help="each field with its value, the rule, what it read, and how old that is",
+        epilog=help_text(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    explains.add_argument("connections", nargs="*", metavar="CONNECTION", help="where MAVLink comes from; see below")
+    explains.add_argument("--at", metavar="TIME", help="moment of a log: 2026-11-20T18:49:07Z, or +44 (seconds)")
+    explains.add_argument("--as-json", action="store_true", help="as JSON, one object for each vehicle")
+    explains.add_argument("--config", metavar="FILE", help="configuration (YAML)")
+    explains.add_argument("--system", type=_system, metavar="N", help="only the vehicle with this system id")
+    explains.add_argument("--baud", type=_baud, metavar="N", help="baud rate of serial connections (57600)")
+    explains.add_argument("--passive", action="store_true", help="never send anything on the vehicle links")
+    explains.set_defaults(out=None, rate=None, json=None, format=None, changes_only=False)
+    _verbosity(explains)
 
     demos = commands.add_parser("demo", help="a fake autopilot and the gateway in one process; about 30 s")
     demos.add_argument("--loop", action="store_true", help="begin again when it ends")

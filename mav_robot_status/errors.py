@@ -16,6 +16,10 @@ class LinkError(MavRobotStatusError):
     """A link or an output failed for good: a port is taken, a permission is missing."""
 
 
+class NothingHeardError(MavRobotStatusError):
+    """A question about a vehicle, and none was heard."""
+
+
 class UsageError(MavRobotStatusError):
     """The command line, a connection string, a missing log file."""
 

@@ -9,6 +9,7 @@ from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import Instant, later, rfc3339
+from ..clock import now as present
 from ..errors import UsageError
 from ..interface import RobotMode, TriState
 from ..link.log import Stamped
@@ -63,7 +64,7 @@ def _up_to(recording: Iterable[Stamped], at: str | None) -> Iterator[Stamped]:
         raise UsageError(f"--at {at}: the log ends at {rfc3339(last.unix_us)}")
 
 
-def explain_live(config: Config, stdout: TextIO, clock: Callable[[], Instant]) -> list[dict[str, Any]]:
+def explain_live(config: Config, stdout: TextIO, clock: Callable[[], Instant] = present) -> list[dict[str, Any]]:
     """The explanations of what is heard on live links, LISTEN seconds after the first heartbeat."""
     gateway = Live(silent(config), stdout)
     gateway.stop_on_signals()

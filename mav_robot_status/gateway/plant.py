@@ -182,7 +182,9 @@ class Plant:
             self._posts.append(_Post(config.name, controller, controller.handle))
 
     def _publishers(self, config: ControllerConfig) -> list[Publisher]:
-        return [self._publisher(p, config.where) for p in _publishers(config)]
+        """The publishers of a controller; on replay there is nobody to hear MAVLink."""
+        heard = [p for p in _publishers(config) if p.type != "mavlink" or not self._context.patient]
+        return [self._publisher(p, config.where) for p in heard]
 
     def _publisher(self, config: PublisherConfig, where: str) -> Publisher:
         """One publisher for each type and set of options: two controllers may share an output."""

@@ -48,16 +48,18 @@ def replay(config: Config, path: str, stdout: TextIO) -> None:
 def run_through(plant: Plant, recording: Iterable[Stamped]) -> Iterator[tuple[Instant, Frame | None]]:
     """Feed a recording to the plant; gives each instant after the plant has lived it."""
     last: Instant | None = None
-    due = -math.inf
+    due = math.inf
     for now, frame, new_segment in recording:
         if last is not None and new_segment:
             plant.forget(last)
         elif last is not None and due < now.mono:
             live_through(plant, last, now)
+            due = plant.next_due(now.mono)
         if frame is not None:
             plant.take(frame, now)
-            plant.tick(now)
-        due = plant.next_due(now.mono)
+            if plant.hw.stirred:
+                plant.tick(now)
+                due = plant.next_due(now.mono)
         last = now
         yield now, frame
 

@@ -34,8 +34,7 @@ def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> tuple[Boot, bool]:
         return boot._replace(doubt_ms=None), False
     if step > 0:
         # on its way a sample is only ever held up, so the earliest boot is the truest; after 49 days the clock wraps
-        late = step < 0 or booted - boot.at < STEP_BACK_MS / 1000
-        at = min(boot.at, booted) if late else booted
+        at = min(boot.at, booted) if booted - boot.at < STEP_BACK_MS / 1000 else booted
         return Boot(at, time_boot_ms), False
     if boot.doubt_ms is None or _difference(time_boot_ms, boot.doubt_ms) < 0:
         return boot._replace(doubt_ms=time_boot_ms), False

@@ -30,7 +30,7 @@ from ..mavlink.definitions import (
 from . import causes, estop, motion, outputs, sensors
 from .boot import GRACE
 from .flight_mode import FlightMode, ModeSources, flight_mode, is_initialising
-from .hearing.movement import driving_speed
+from .hearing.movement import driving_speed, speed_over_ground
 from .identity import AIRCRAFT, ARMED, HIL, Stack
 from .memory import Memory
 from .observation import is_fresh
@@ -299,6 +299,9 @@ def in_motion(view: View) -> Finding:
     if source is not None:
         value = motion.settle(memory.motion, now).value
         why = Evidence("speed and rotation, with hysteresis", source, at)
+        if value is TRUE and not view.armed and _gps_contradicts(view):
+            # seen after a crash: the estimate ran away at 36 m/s while the vehicle lay on its back
+            return UNKNOWN, Evidence("disarmed: the estimate moves, the GPS receiver stands still", source, at)
     elif aircraft and landed_state == ON_GROUND:
         value = FALSE
         why = Evidence("on the ground, no speed known", "EXTENDED_SYS_STATE.landed_state", landed_at)
@@ -313,10 +316,21 @@ def in_motion(view: View) -> Finding:
 
 
 def _gps_stands_still(view: View) -> bool:
-    """True if the receiver's own speed says rest. It is believed for nothing else: at rest it may read several m/s."""
+    """True if the receiver's own speed says rest (and nothing rotates).
+
+    It is believed for nothing else: at rest it may read several m/s.
+    """
     memory = view.memory
     fresh = is_fresh(memory.observation.gps, view.now, motion.FRESH)
     return fresh and motion.settle(memory.gps_motion, view.now).value is FALSE
+
+
+def _gps_contradicts(view: View) -> bool:
+    """True if the estimate has a speed over ground and the GPS receiver has none."""
+    position = view.memory.observation.global_position
+    if position is None or not is_fresh(position, view.now, motion.FRESH) or not _gps_stands_still(view):
+        return False
+    return speed_over_ground(view.memory) > view.options.v_on_disarmed
 
 
 def _on_ground(view: View) -> bool:

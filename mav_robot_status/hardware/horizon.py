@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from . import boot, causes, estop, motion, outputs, sensors, statustext
 from .flight_mode import CURRENT_MODE_FRESH
-from .hearing.movement import driving_speed
+from .hearing.movement import driving_speed, speed_over_ground
 from .observation import slowly_fresh_until
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .options import HardwareOptions
 
 
-def matters(memory: Memory) -> tuple[object, ...]:
+def matters(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     """All that a status depends on but times of arrival: if equal before and after a message, it changed nothing."""
     seen = memory.observation
     status = seen.sys_status.message[:3] if seen.sys_status is not None else None
@@ -40,6 +40,7 @@ def matters(memory: Memory) -> tuple[object, ...]:
         memory.rc_lost_since,
         _motion(memory.motion),
         _motion(memory.gps_motion),
+        not memory.pulse.armed and speed_over_ground(memory) > options.v_on_disarmed,
         seen.extended_sys_state.message if seen.extended_sys_state is not None else None,
         watch.driven,
         watch.held_since,
@@ -83,8 +84,7 @@ def _ends(memory: Memory, options: HardwareOptions) -> Iterator[float]:
                 least = options.sys_status_timeout
             elif heard is seen.current_mode:
                 least = CURRENT_MODE_FRESH
-            yield _after(heard.at + least)
-            yield _after(slowly_fresh_until(heard))
+            yield _after(max(heard.at + least, slowly_fresh_until(heard)))
     if memory.watch.at is not None:
         yield _after(memory.watch.at + motion.FRESH)
     if memory.watch.held_since is not None:

@@ -20,7 +20,7 @@ from ..interface import (
     RobotStatus,
 )
 from ..mavlink import definitions as mav
-from ..mavlink.decode import decode
+from ..mavlink.decode import decode, text
 from . import derive as rules
 from . import horizon
 from .hearing import HANDLERS, hear, overheard, pass_time
@@ -28,7 +28,8 @@ from .identity import Stack, is_autopilot
 from .memory import begin
 from .observation import SILENCE
 from .options import HardwareOptions
-from .requests import Requests, wanted_of
+from .parameters import Parameters
+from .requests import OUTPUT_WATCH, Requests, wanted_of
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
@@ -63,7 +64,7 @@ class Ask(NamedTuple):
 class Tracked:
     """One vehicle: its handle, and once it was heard its ids and memory."""
 
-    __slots__ = ("boots", "deadline", "dirty", "handle", "ids", "memory", "requests", "seen", "slot")
+    __slots__ = ("boots", "deadline", "dirty", "handle", "ids", "memory", "parameters", "requests", "seen", "slot")
 
     def __init__(self, slot: Slot) -> None:
         self.slot = slot
@@ -72,6 +73,7 @@ class Tracked:
         self.ids: tuple[int, int] | None = None
         self.memory: Memory | None = None
         self.requests: Requests | None = None
+        self.parameters: Parameters | None = None
         self.boots = 0
         self.seen: tuple[object, ...] = ()
         """What mattered at the last look."""
@@ -104,6 +106,8 @@ class MavlinkRobotHW(RobotHW):
         self._open = not slots
         """Whether every autopilot heard becomes a handle."""
         self._tracked: dict[tuple[int, int], Tracked] = {}
+        self.stirred = False
+        """Whether something was taken, since the last `read`, that may change a status."""
         self.ignored = 0
         """Heartbeats of autopilots that no entry of the configuration names, or beyond MOST_VEHICLES."""
         for slot in slots:
@@ -141,11 +145,14 @@ class MavlinkRobotHW(RobotHW):
             tracked.requests.arrived(frame.message_id, now.mono)
             if type(message) is mav.CommandAck:
                 tracked.requests.acknowledged(message, (self.own_system or ids[0], self.own_component), now.mono)
+        if type(message) is mav.ParamValue and tracked.parameters is not None:
+            tracked.parameters.heard(text(message.param_id))
         self._hear(tracked, message, now)
         return None
 
     def read(self, now: Instant) -> None:
         """Set the handles to what is so at `now`."""
+        self.stirred = False
         for tracked in self._tracked.values():
             if tracked.dirty or now.mono >= tracked.deadline:
                 self._evaluate(tracked, now)
@@ -168,6 +175,12 @@ class MavlinkRobotHW(RobotHW):
             command = tracked.requests.due(now.mono, wanted, memory.stack is not Stack.ARDUPILOT)
             if command is not None:
                 asks.append(Ask(*ids, command))
+            elif OUTPUT_WATCH[0] in wanted:
+                if tracked.parameters is None:
+                    tracked.parameters = Parameters(*ids, now.mono)
+                request = tracked.parameters.due(now.mono)
+                if request is not None:
+                    asks.append(Ask(*ids, request))
         return asks
 
     def next_due(self) -> float:
@@ -177,6 +190,8 @@ class MavlinkRobotHW(RobotHW):
             due = min(due, tracked.deadline)
             if tracked.requests is not None and tracked.handle.detail.link is LinkState.CONNECTED:
                 due = min(due, tracked.requests.next_due())
+                if tracked.parameters is not None:
+                    due = min(due, tracked.parameters.next_due())
         return due
 
     def forget(self) -> None:
@@ -223,7 +238,8 @@ class MavlinkRobotHW(RobotHW):
         else:
             tracked.memory = hear(tracked.memory, message, now, self.options)
         if not tracked.dirty:
-            tracked.dirty = self._hasty or horizon.matters(tracked.memory) != tracked.seen
+            tracked.dirty = self._hasty or horizon.matters(tracked.memory, self.options) != tracked.seen
+        self.stirred = self.stirred or tracked.dirty
         if type(message) is mav.Heartbeat:
             tracked.handle.heard_at = now.mono
         if tracked.memory.boots != tracked.boots:
@@ -245,7 +261,7 @@ class MavlinkRobotHW(RobotHW):
             handle.detail = derived.detail
         handle.evidence = derived.evidence
         tracked.dirty = False
-        tracked.seen = horizon.matters(memory)
+        tracked.seen = horizon.matters(memory, self.options)
         lost = derived.detail.link is LinkState.LOST
         tracked.deadline = math.inf if lost else horizon.next_change(memory, now.mono, self.options)
 

@@ -127,6 +127,12 @@ def _moved(memory: Memory, speed: float | None, now: Instant, options: HardwareO
     return memory._replace(motion=motion.moved(memory.motion, speed, rate, memory.pulse.armed, options, now.mono))
 
 
+def speed_over_ground(memory: Memory) -> float:
+    """The estimated speed over ground in m/s; 0 while none was heard."""
+    position = memory.observation.global_position
+    return 0.0 if position is None else math.hypot(position.message.vx, position.message.vy) / 100
+
+
 def driving_speed(memory: Memory) -> float:
     """What would grow if the motors really ran: speed over ground of a rover, climb of a copter; m/s."""
     hud = memory.observation.vfr_hud

@@ -122,6 +122,13 @@ def test_a_reboot_while_armed_is_told_by_a_heartbeat_alone() -> None:
     assert flight.codes == [5004]
 
 
+def test_a_crash_that_is_told_just_before_the_heartbeat_that_shows_the_arming_stays() -> None:
+    flight = copter()
+    flight.wait(1.5)
+    flight.text("Crash: Disarming: AngErr=42", 0).hb(armed=True)
+    assert flight.codes == [4001]
+
+
 # -- SYS_STATUS --------------------------------------------------------------------------------------------------------
 
 
@@ -215,6 +222,17 @@ def test_a_velocity_of_exactly_zero_is_believed_of_px4() -> None:
 def test_what_a_disarmed_ardupilot_with_an_unhealthy_ahrs_measures_is_noise() -> None:
     flight = rover().set(health=FITTED & ~AHRS | PREARM)
     assert moving(flight, lambda: here(flight, 5, 0, 0)) is UNKNOWN
+
+
+def test_a_velocity_of_exactly_zero_is_no_estimate_of_an_inav_without_gps() -> None:
+    for bits, expected in ((FITTED & ~MOTORS & ~GPS, UNKNOWN), (FITTED & ~MOTORS, FALSE)):
+        flight = Flight(vehicle_type=PLANE).set(present=bits, enabled=bits, health=bits)
+        assert moving(flight, lambda: hud(0, 0)) is expected
+
+
+def test_a_disarmed_aircraft_that_stands_still_is_still() -> None:
+    flight = px4()
+    assert moving(flight, lambda: local(flight, 0, 0, 0)) is FALSE
 
 
 def test_numbers_that_are_none_are_no_speed() -> None:

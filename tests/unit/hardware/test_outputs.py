@@ -63,6 +63,11 @@ def test_without_throttle_outputs_at_stop_say_nothing() -> None:
     assert Machine().learn().fly().put(STOP, throttle=None).judge(after=9) is TriState.UNKNOWN
 
 
+def test_outputs_near_their_stop_value_are_not_at_it() -> None:
+    assert Machine().learn().fly().put((1005, 1000, 995, 1000)).judge(after=1) is TriState.TRUE
+    assert Machine().learn().fly().put((1006, 1000, 1000, 1000)).judge(after=9) is TriState.UNKNOWN
+
+
 def test_outputs_that_never_left_their_stop_value_since_arming_are_not_held() -> None:
     machine = Machine().learn().fly()
     machine.beat(False).put(STOP).beat(False)

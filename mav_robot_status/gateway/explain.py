@@ -92,7 +92,7 @@ def moment(at: str, start_us: int) -> int:
         if at.startswith("+"):
             return start_us + round(float(at) * 1e6)
         time = datetime.fromisoformat(at.replace("Z", "+00:00"))
-    except ValueError:
+    except (ValueError, OverflowError):
         raise UsageError(
             f"--at {at}: write a time like {rfc3339(start_us)}, or +44 for seconds from the start"
         ) from None

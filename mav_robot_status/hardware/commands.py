@@ -17,7 +17,7 @@ DO_AUX_FUNCTION: Final = 218
 COMMANDS: Final = frozenset({DO_FLIGHTTERMINATION, DO_AUX_FUNCTION})
 MOTOR_ESTOP: Final = 31  # the auxiliary function
 LOW, HIGH = 0, 2  # the positions of its switch
-ACCEPTED: Final = 0  # MAV_RESULT
+ACCEPTED, IN_PROGRESS = 0, 5  # MAV_RESULT
 PATIENCE: Final = 5.0  # s for an acknowledgement
 
 
@@ -40,11 +40,11 @@ def asked(message: CommandLong | CommandInt, sender: tuple[int, int], now: Insta
 
 
 def is_answered(asked: Asked | None, ack: CommandAck, now: Instant) -> bool:
-    """True if `ack` accepts the command that was asked."""
+    """True if `ack` is the last word on the command that was asked, be it accepted or refused."""
     return (
         asked is not None
         and ack.command == asked.command
-        and ack.result == ACCEPTED
+        and ack.result != IN_PROGRESS
         and ack.target_system in (0, asked.sender[0])
         and now.mono - asked.at <= PATIENCE
     )

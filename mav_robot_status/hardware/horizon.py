@@ -6,8 +6,9 @@ Deriving a status costs ten times what hearing a message does, and most messages
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from ..mavlink import definitions as mav
 from . import boot, causes, estop, motion, outputs, sensors, statustext
 from .flight_mode import CURRENT_MODE_FRESH
 from .hearing.movement import driving_speed, speed_over_ground
@@ -19,15 +20,57 @@ if TYPE_CHECKING:
     from .memory import Memory
     from .options import HardwareOptions
 
+MOVEMENT: Final = frozenset(
+    {
+        mav.Attitude,
+        mav.GlobalPositionInt,
+        mav.GpsRawInt,
+        mav.LocalPositionNed,
+        mav.ServoOutputRaw,
+        mav.SystemTime,
+        mav.VfrHud,
+    }
+)
+"""The messages that come several times a second."""
+
 
 def matters(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     """All that a status depends on but times of arrival: if equal before and after a message, it changed nothing."""
+    return of_movement(memory, options), of_the_rest(memory)
+
+
+def of_movement(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    """The part of `matters` that a message in MOVEMENT can change, unless it shows a reboot."""
+    seen, watch = memory.observation, memory.watch
+    moving, gps = memory.motion, memory.gps_motion
+    held = watch.held_since is not None
+    return (
+        moving.value,
+        moving.fast_since,
+        moving.slow_since,
+        moving.speed is None,
+        gps.value,
+        gps.fast_since,
+        gps.slow_since,
+        gps.speed is None,
+        not memory.pulse.armed and speed_over_ground(memory) > options.v_on_disarmed,
+        watch.driven,
+        watch.held_since,
+        held and outputs.is_vetoed(watch, memory.family, driving_speed(memory)),
+        seen.vfr_hud if held else None,  # a speed that grows vetoes
+        memory.stop.said,  # ended by a motor that is driven
+        memory.boots,
+        memory.boot.at if memory.faults else None,  # dated a little better by each clock, while faults wait for it
+        *[heard.since for heard in seen if heard is not None],
+    )
+
+
+def of_the_rest(memory: Memory) -> tuple[object, ...]:
+    """The other part: what the vehicle says of itself."""
     seen = memory.observation
-    status = seen.sys_status.message[:3] if seen.sys_status is not None else None
-    watch = memory.watch
     return (
         seen.heartbeat.message if seen.heartbeat is not None else None,
-        status,
+        seen.sys_status.message[:3] if seen.sys_status is not None else None,
         [bit for bit, fault in memory.faults.items() if fault.messages >= sensors.DEBOUNCE_MESSAGES],
         memory.faults.keys(),
         memory.stop.said,
@@ -38,33 +81,19 @@ def matters(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
         memory.failsafe,
         memory.internal_errors_since,
         memory.rc_lost_since,
-        _motion(memory.motion),
-        _motion(memory.gps_motion),
-        not memory.pulse.armed and speed_over_ground(memory) > options.v_on_disarmed,
         seen.extended_sys_state.message if seen.extended_sys_state is not None else None,
-        watch.driven,
-        watch.held_since,
-        watch.held_since is not None and outputs.is_vetoed(watch, memory.family, driving_speed(memory)),
-        seen.vfr_hud if watch.held_since is not None else None,  # a speed that grows vetoes
         seen.current_mode.message if seen.current_mode is not None else None,
         memory.modes,
-        _grace(memory),
         memory.impostor,
         memory.assumed_free,
-        memory.boots,
-        *[heard.since for heard in seen if heard is not None],
     )
 
 
-def _grace(memory: Memory) -> float | None:
-    """The boot, which each message with a clock dates a little better, while it keeps faults from counting."""
-    beat = memory.observation.heartbeat
-    new = beat is not None and beat.at - memory.boot.at < boot.GRACE
-    return memory.boot.at if memory.faults and new else None
-
-
-def _motion(moving: motion.Motion) -> tuple[object, ...]:
-    return moving.value, moving.fast_since, moving.slow_since, moving.speed is None
+def may_matter(memory: Memory, message: object, before: tuple[object, ...], options: HardwareOptions) -> bool:
+    """Whether `message`, just heard, changed something that matters since `before`."""
+    if type(message) in MOVEMENT:
+        return of_movement(memory, options) != before[0]
+    return matters(memory, options) != before
 
 
 def next_change(memory: Memory, now: float, options: HardwareOptions) -> float:

@@ -238,7 +238,7 @@ class MavlinkRobotHW(RobotHW):
         else:
             tracked.memory = hear(tracked.memory, message, now, self.options)
         if not tracked.dirty:
-            tracked.dirty = self._hasty or horizon.matters(tracked.memory, self.options) != tracked.seen
+            tracked.dirty = self._hasty or horizon.may_matter(tracked.memory, message, tracked.seen, self.options)
         self.stirred = self.stirred or tracked.dirty
         if type(message) is mav.Heartbeat:
             tracked.handle.heard_at = now.mono

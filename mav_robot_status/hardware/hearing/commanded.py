@@ -31,6 +31,8 @@ def command_ack(memory: Memory, message: CommandAck, now: Instant, options: Hard
     if asked is None or not commands.is_answered(asked, message, now):
         return memory
     memory = memory._replace(asked=None)
+    if message.result != commands.ACCEPTED:
+        return memory
     source = f"COMMAND_ACK: accepted command {asked.command} of {asked.sender[0]}.{asked.sender[1]}"
     if asked.command == commands.DO_FLIGHTTERMINATION:
         if asked.param1 >= 0.5 and memory.family in TERMINATES.get(memory.stack, frozenset()):

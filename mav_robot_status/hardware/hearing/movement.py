@@ -32,59 +32,68 @@ def extended_sys_state(memory: Memory, message: Any, now: Instant, options: Hard
 
 def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions) -> Memory:
     """GLOBAL_POSITION_INT: the first choice for speed."""
-    memory = _clock(memory, message.time_boot_ms, now)
-    memory = observed(memory, global_position=heard(message, now.mono, memory.observation.global_position))
+    memory, boot = _clock(memory, message.time_boot_ms, now)
+    position = heard(message, now.mono, memory.observation.global_position)
     velocity = message.vx / 100, message.vy / 100, message.vz / 100
-    nowhere = message.lat == 0 and message.lon == 0
-    return _moved(memory, _speed(memory, velocity, not any(velocity), nowhere), now, options)
+    speed = _speed(memory, velocity, not any(velocity), message.lat == 0 and message.lon == 0)
+    return memory._replace(
+        boot=boot,
+        observation=memory.observation._replace(global_position=position),
+        motion=_moved(memory, memory.motion, speed, now, options),
+    )
 
 
 def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> Memory:
     """LOCAL_POSITION_NED: the speed while no global position is fresh."""
-    memory = _clock(memory, message.time_boot_ms, now)
-    memory = observed(memory, local_position=heard(message, now.mono, memory.observation.local_position))
-    if is_fresh(memory.observation.global_position, now.mono, motion.FRESH):
-        return memory
-    velocity = message.vx, message.vy, message.vz
-    return _moved(memory, _speed(memory, velocity, not any(velocity)), now, options)
+    memory, boot = _clock(memory, message.time_boot_ms, now)
+    moving = memory.motion
+    if not is_fresh(memory.observation.global_position, now.mono, motion.FRESH):
+        velocity = message.vx, message.vy, message.vz
+        moving = _moved(memory, moving, _speed(memory, velocity, not any(velocity)), now, options)
+    position = heard(message, now.mono, memory.observation.local_position)
+    return memory._replace(boot=boot, observation=memory.observation._replace(local_position=position), motion=moving)
 
 
 def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> Memory:
     """VFR_HUD: the last choice for speed; the throttle for the output watch."""
-    memory = observed(memory, vfr_hud=heard(message, now.mono, memory.observation.vfr_hud))
-    observation = memory.observation
-    if is_fresh(observation.global_position, now.mono, motion.FRESH) or is_fresh(
-        observation.local_position, now.mono, motion.FRESH
+    before = memory.observation
+    observation = before._replace(vfr_hud=heard(message, now.mono, before.vfr_hud))
+    if is_fresh(before.global_position, now.mono, motion.FRESH) or is_fresh(
+        before.local_position, now.mono, motion.FRESH
     ):
-        return memory
+        return memory._replace(observation=observation)
     still = message.groundspeed == 0  # whatever the climb, which comes from the barometer
-    return _moved(memory, _speed(memory, (message.groundspeed, 0.0, message.climb), still), now, options)
+    speed = _speed(memory, (message.groundspeed, 0.0, message.climb), still)
+    return memory._replace(observation=observation, motion=_moved(memory, memory.motion, speed, now, options))
 
 
 def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> Memory:
     """GPS_RAW_INT: whether the receiver itself stands still."""
     if message.fix_type < FIX_3D or message.vel == NO_SPEED:
         return memory._replace(gps_motion=motion.UNKNOWN)
-    memory = observed(memory, gps=heard(message, now.mono, memory.observation.gps))
-    rate = rotation(memory, now.mono)
-    moved = motion.moved(memory.gps_motion, message.vel / 100, rate, memory.pulse.armed, options, now.mono)
-    return memory._replace(gps_motion=moved)
+    return memory._replace(
+        observation=memory.observation._replace(gps=heard(message, now.mono, memory.observation.gps)),
+        gps_motion=_moved(memory, memory.gps_motion, message.vel / 100, now, options),
+    )
 
 
 def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> Memory:
     """ATTITUDE: rotation."""
-    memory = _clock(memory, message.time_boot_ms, now)
-    return observed(memory, attitude=heard(message, now.mono, memory.observation.attitude))
+    memory, boot = _clock(memory, message.time_boot_ms, now)
+    rotating = heard(message, now.mono, memory.observation.attitude)
+    return memory._replace(boot=boot, observation=memory.observation._replace(attitude=rotating))
 
 
 def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> Memory:
     """SYSTEM_TIME: the autopilot's clock."""
-    return _clock(memory, message.time_boot_ms, now)
+    memory, boot = _clock(memory, message.time_boot_ms, now)
+    return memory._replace(boot=boot)
 
 
-def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> Memory:
+def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> tuple[Memory, boot_rules.Boot]:
+    """The boot as this clock tells it, and the memory: begun anew if the clock shows a reboot."""
     boot, anew = boot_rules.heard_clock(memory.boot, time_boot_ms, now.mono)
-    return rebooted(memory, boot, now) if anew else memory._replace(boot=boot)
+    return (rebooted(memory, boot, now) if anew else memory), boot
 
 
 def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, nowhere: bool = False) -> float | None:
@@ -119,12 +128,14 @@ def rotation(memory: Memory, now: float) -> float:
         return 0.0
     m: mav.Attitude = attitude.message
     rates = (m.yawspeed,) if memory.vehicle_type == SURFACE_BOAT else (m.rollspeed, m.pitchspeed, m.yawspeed)
-    return max((abs(rate) for rate in rates if math.isfinite(rate)), default=0.0)
+    return max([abs(rate) for rate in rates if math.isfinite(rate)], default=0.0)
 
 
-def _moved(memory: Memory, speed: float | None, now: Instant, options: HardwareOptions) -> Memory:
-    rate = rotation(memory, now.mono)
-    return memory._replace(motion=motion.moved(memory.motion, speed, rate, memory.pulse.armed, options, now.mono))
+def _moved(
+    memory: Memory, before: motion.Motion, speed: float | None, now: Instant, options: HardwareOptions
+) -> motion.Motion:
+    """A motion after one more sample of speed."""
+    return motion.moved(before, speed, rotation(memory, now.mono), memory.pulse.armed, options, now.mono)
 
 
 def speed_over_ground(memory: Memory) -> float:

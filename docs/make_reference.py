@@ -10,7 +10,8 @@ import sys
 from collections.abc import Iterable, Iterator
 
 from mav_robot_status.hardware import causes, identity, sensors
-from mav_robot_status.hardware.derive import INHIBITS, sensor_name
+from mav_robot_status.hardware.fields.inhibits import INHIBITS
+from mav_robot_status.hardware.fields.view import sensor_name
 from mav_robot_status.hardware.flight_mode import ARDUPILOT_TABLES, INAV_LIMITS
 from mav_robot_status.hardware.hearing.words import TEXT_TABLES
 from mav_robot_status.hardware.identity import Stack

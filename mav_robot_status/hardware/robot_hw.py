@@ -21,8 +21,9 @@ from ..interface import (
 )
 from ..mavlink import definitions as mav
 from ..mavlink.decode import decode, text
-from . import derive as rules
 from . import horizon
+from .derive import derive
+from .fields.view import named
 from .hearing import HANDLERS, hear, overheard, pass_time
 from .identity import Stack, is_autopilot
 from .memory import begin
@@ -228,7 +229,7 @@ class MavlinkRobotHW(RobotHW):
             return None
         tracked.ids = ids
         self._tracked[ids] = tracked
-        names = rules.named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), rules.named(mav.TYPE_NAMES, heartbeat.type)
+        names = named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), named(mav.TYPE_NAMES, heartbeat.type)
         log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
         return tracked
 
@@ -253,7 +254,7 @@ class MavlinkRobotHW(RobotHW):
             return
         memory = tracked.memory = pass_time(tracked.memory, now, self.options)
         handle = tracked.handle
-        derived = rules.derive(memory, tracked.ids, handle.detail, now, self.options)
+        derived = derive(memory, tracked.ids, handle.detail, now, self.options)
         self._log_link(tracked, derived.detail.link)
         if derived.status != handle.status:
             handle.status = derived.status

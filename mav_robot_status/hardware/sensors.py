@@ -52,7 +52,8 @@ BITS: Final[dict[int, Weight]] = {
 CONTROL: Final = dict.fromkeys((10, 11, 12, 13, 14), SOFT)  # elsewhere listed as enabled and never healthy
 
 WEIGHTS: Final[dict[Stack, dict[int, Weight]]] = {
-    Stack.ARDUPILOT: BITS | CONTROL,
+    # ArduPlane lists terrain as unhealthy through every good flight; a loss of terrain data that matters is a text
+    Stack.ARDUPILOT: {bit: weight for bit, weight in (BITS | CONTROL).items() if bit != 22},
     # PX4 shows failed motors in bit 15, and lists RC as unhealthy through a whole flight that needs none
     Stack.PX4: {bit: weight for bit, weight in (BITS | CONTROL | {15: HARD}).items() if bit != 16},
     Stack.INAV: BITS,

@@ -16,7 +16,22 @@ that do not wait, call `FakeAutopilot.poll` with the instants of a `ManualClock`
 from .fake_autopilot import FakeAutopilot, decode
 from .manual_clock import ManualClock
 from .scenario import Action, Scenario, Step, Text, VehicleState, step
-from .scenarios import BY_NAME, DEMO, arducopter, ardurover, px4
+from .scenarios import (
+    BY_NAME,
+    DEMO,
+    arduboat,
+    arducopter,
+    arduplane,
+    ardurover,
+    ardusub,
+    betaflight,
+    blimp,
+    inav,
+    px4,
+    px4_vtol,
+    quadplane,
+    tracker,
+)
 
 __all__ = [
     "BY_NAME",
@@ -28,9 +43,18 @@ __all__ = [
     "Step",
     "Text",
     "VehicleState",
+    "arduboat",
     "arducopter",
+    "arduplane",
     "ardurover",
+    "ardusub",
+    "betaflight",
+    "blimp",
     "decode",
+    "inav",
     "px4",
+    "px4_vtol",
+    "quadplane",
     "step",
+    "tracker",
 ]

@@ -20,7 +20,7 @@ from .firmware import (
     not_armable,
     px4_mode,
 )
-from .messages import BUILDERS, can_send
+from .messages import BUILDERS, available_modes, can_send
 from .scenario import Text, step
 from .vehicle_model import VehicleModel
 
@@ -28,6 +28,7 @@ CUSTOM_MODE_ENABLED = 1
 FORCED = 21196
 GCS = 6
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, ARM_DISARM, DO_SET_MODE, SET_MODE = 511, 512, 400, 176, 11
+AVAILABLE_MODES = 435
 STREAM_GROUPS = {2: (1,), 3: (36,), 6: (33, 32), 10: (30,), 11: (74,), 12: (2,)}
 """ArduPilot's stream groups: which of our messages REQUEST_DATA_STREAM starts. 0 means all of them."""
 INT16 = 4
@@ -69,6 +70,10 @@ def _set_message_interval(model: VehicleModel, m: Any) -> int:
 
 
 def _request_message(model: VehicleModel, m: Any) -> int:
+    if m.param1 == AVAILABLE_MODES and model.firmware.modes:
+        for mode in available_modes(model.firmware, int(m.param2) if math.isfinite(m.param2) else 0):
+            model.send(mode)
+        return ACCEPTED
     if not can_send(model.firmware, m.param1):
         return UNSUPPORTED
     model.send(BUILDERS[int(m.param1)](model.snapshot()))

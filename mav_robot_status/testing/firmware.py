@@ -15,6 +15,16 @@ ON_GROUND, IN_AIR, TAKEOFF, LANDING = 1, 2, 3, 4
 INITIALISING = 16
 
 
+class Mode(NamedTuple):
+    """One row of AVAILABLE_MODES."""
+
+    custom_mode: int
+    name: str
+    standard_mode: int = 0
+    """MAV_STANDARD_MODE; 0 non-standard."""
+    properties: int = 0
+
+
 class Firmware(NamedTuple):
     """One autopilot firmware in one kind of vehicle."""
 
@@ -36,6 +46,7 @@ class Firmware(NamedTuple):
     arming_refused: str
     """The text that goes with it; {} stands for the reason."""
     armed_text: str
+    """Empty: it says nothing when it is armed or disarmed."""
     disarmed_text: str
     parameters: Mapping[str, int]
     vtol_state: int
@@ -44,6 +55,10 @@ class Firmware(NamedTuple):
     """From `booting` to `ready`; the times count from the first heartbeat."""
     ready: VehicleState
     """Disarmed, all checks passed."""
+    modes: tuple[Mode, ...] = ()
+    """What it answers to a request for AVAILABLE_MODES; empty: it does not know that message."""
+    on_request: frozenset[int] | None = None
+    """The messages that it can be asked for; None: all that it has."""
 
 
 def base_mode(firmware: Firmware, state: VehicleState) -> int:
@@ -61,13 +76,14 @@ def system_status(firmware: Firmware, state: VehicleState) -> int:
 def sensors(firmware: Firmware, state: VehicleState, prearm_ok: bool) -> tuple[int, int, int]:
     """The masks of SYS_STATUS: present, enabled, health.
 
-    ArduPilot says PREARM_CHECK in all three, healthy also while armed; PX4 only in health.
+    ArduPilot says PREARM_CHECK in all three, healthy also while armed; PX4 only in health; others not at all.
     """
     present, enabled = state.sensors_present, state.sensors_enabled
     healthy = prearm_ok or (state.armed and firmware.autopilot == ARDUPILOT)
     if state.safety_switch and firmware.autopilot == ARDUPILOT:
         enabled &= ~MOTOR_OUTPUTS
-    return present, enabled, state.sensors_health & ~PREARM_CHECK | (PREARM_CHECK if healthy else 0)
+    told = firmware.autopilot == PX4 or present & PREARM_CHECK
+    return present, enabled, state.sensors_health & ~PREARM_CHECK | (PREARM_CHECK if healthy and told else 0)
 
 
 def not_armable(state: VehicleState) -> str:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..mavlink.pymavlink_dialect import (
     MAVLink_attitude_message,
+    MAVLink_available_modes_message,
     MAVLink_current_mode_message,
     MAVLink_extended_sys_state_message,
     MAVLink_global_position_int_message,
@@ -20,7 +21,7 @@ from ..mavlink.pymavlink_dialect import (
     MAVLink_system_time_message,
     MAVLink_vfr_hud_message,
 )
-from .firmware import ARDUPILOT, Firmware, base_mode, sensors, system_status
+from .firmware import ARDUPILOT, PX4, Firmware, base_mode, sensors, system_status
 from .scenario import Text, VehicleState
 
 HEARTBEAT, SYS_STATUS = 0, 1
@@ -85,11 +86,14 @@ def _vfr_hud(s: Snapshot) -> MAVLink_message:
 
 
 def _extended_sys_state(s: Snapshot) -> MAVLink_message:
-    return MAVLink_extended_sys_state_message(s.firmware.vtol_state, s.state.landed_state)
+    vtol_state = s.firmware.vtol_state if s.state.vtol_state is None else s.state.vtol_state
+    return MAVLink_extended_sys_state_message(vtol_state, s.state.landed_state)
 
 
 def _current_mode(s: Snapshot) -> MAVLink_message:
-    return MAVLink_current_mode_message(0, s.state.custom_mode, s.state.custom_mode)
+    number = s.state.custom_mode
+    standard_mode = next((mode.standard_mode for mode in s.firmware.modes if mode.custom_mode == number), 0)
+    return MAVLink_current_mode_message(standard_mode, number, number)
 
 
 BUILDERS: dict[int, Callable[[Snapshot], MAVLink_message]] = {
@@ -112,14 +116,26 @@ def can_send(firmware: Firmware, message_id: int) -> bool:
         message_id in BUILDERS
         and message_id != HEARTBEAT
         and not (firmware.autopilot == ARDUPILOT and message_id == 436)
+        and (firmware.on_request is None or message_id in firmware.on_request)
     )
 
 
+def available_modes(firmware: Firmware, index: int) -> list[MAVLink_message]:
+    """AVAILABLE_MODES: the mode with this index, which counts from 1, or with 0 all of them."""
+    return [
+        MAVLink_available_modes_message(
+            len(firmware.modes), i, mode.standard_mode, mode.custom_mode, mode.properties, mode.name.encode()
+        )
+        for i, mode in enumerate(firmware.modes, 1)
+        if index in (0, i)
+    ]
+
+
 def statustexts(firmware: Firmware, text: Text, number: int) -> list[MAVLink_message]:
-    """One text as it goes out. ArduPilot numbers only those that need chunks, PX4 every text; a text that ends with a
+    """One text as it goes out. PX4 numbers every text, others only those that need chunks; a text that ends with a
     full chunk gets an empty one more, for only a short chunk says that it is the last."""
     data = text.text.encode()
-    if firmware.autopilot == ARDUPILOT and len(data) <= CHUNK:
+    if firmware.autopilot != PX4 and len(data) <= CHUNK:
         return [MAVLink_statustext_message(text.severity, data)]
     chunks = [data[i : i + CHUNK] for i in range(0, len(data) + 1, CHUNK)]
     return [MAVLink_statustext_message(text.severity, chunk, number, i) for i, chunk in enumerate(chunks)]

@@ -38,6 +38,8 @@ class VehicleState(NamedTuple):
     errors_count1: int = 0
     landed_state: int = 0
     """MAV_LANDED_STATE: 0 undefined, 1 on the ground, 2 in the air, 3 taking off, 4 landing."""
+    vtol_state: int | None = None
+    """MAV_VTOL_STATE: 1 and 2 in transition, 3 hovering, 4 on its wings; None: as the firmware says it."""
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """North, east, down in m/s."""
     rates: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ..clock import Instant
 from ..mavlink.pymavlink_dialect import MAVLink_message
-from .firmware import ARDUPILOT, not_armable
+from .firmware import ARDUPILOT, PX4, not_armable
 from .messages import BUILDERS, HEARTBEAT, SYS_STATUS, Snapshot, heartbeat, statustexts
 from .scenario import Action, Scenario, Step, Text
 
@@ -149,9 +149,9 @@ class VehicleModel:
         self._seq = (self._seq + 1) % 256
 
     def say(self, text: Text) -> None:
-        """Send a STATUSTEXT: ArduPilot where it heard something or streams flow, PX4 only to a ground station."""
+        """Send a STATUSTEXT: PX4 only to a ground station, others where they heard something or streams flow."""
         streaming = len(self._intervals) > 2
-        if self.heard or streaming if self.firmware.autopilot == ARDUPILOT else self.gcs_heard:
+        if self.gcs_heard if self.firmware.autopilot == PX4 else self.heard or streaming:
             self._texts = self._texts % 0xFFFF + 1
             for message in statustexts(self.firmware, text, self._texts):
                 self.send(message)
@@ -166,8 +166,9 @@ class VehicleModel:
             self.send(heartbeat(self.snapshot()))
         for text in step.texts:
             self.say(text)
-        if self.state.armed != before.armed:
-            self.say(Text(6, self.firmware.armed_text if self.state.armed else self.firmware.disarmed_text))
+        words = self.firmware.armed_text if self.state.armed else self.firmware.disarmed_text
+        if self.state.armed != before.armed and words:
+            self.say(Text(6, words))
         if step.action is not None:
             self._act(step.action)
 

@@ -19,7 +19,7 @@ from mav_robot_status.config.reader import PARAMETERS
 from mav_robot_status.controller import DEFAULT_PUBLISH_RATE
 from mav_robot_status.gateway.plant import DEFAULT_PUBLISHERS
 from mav_robot_status.hardware.causes import CAUSES
-from mav_robot_status.hardware.derive import INHIBITS
+from mav_robot_status.hardware.fields.inhibits import INHIBITS
 from mav_robot_status.hardware.options import HardwareOptions, Within
 from mav_robot_status.interface import DEFAULT_HANDLE_NAME, Detail, RobotStatus
 from mav_robot_status.link.url import KINDS
@@ -126,7 +126,7 @@ def test_every_option_that_is_mentioned_exists() -> None:
     command = [sys.executable, "-m", "mav_robot_status.cli"]
     helps = [
         subprocess.run([*command, name, "--help"], capture_output=True, text=True, timeout=30, check=True).stdout
-        for name in ("run", "demo", "check-config", "dialect")
+        for name in ("run", "explain", "demo", "check-config", "dialect")
     ]
     for document in DOCUMENTS:
         mentioned = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", document.read_text()))

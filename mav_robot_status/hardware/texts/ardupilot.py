@@ -42,7 +42,7 @@ RULES: Final = table(
         (r"Terminating due to ", CAUSE, (1002,)),
         # failsafes
         (r".*Radio \+ Battery Failsafe", CAUSE, (2001,)),
-        (r"Radio Failsafe|RC Failsafe|RC (Short|Long) Failsafe On|Throttle failsafe on", CAUSE, (2001,)),
+        (r"Radio Failsafe|RC Failsafe|RC (Short|Long) Failsafe|Throttle failsafe on", CAUSE, (2001,)),
         (r"Failsafe\. (Short|Long) event on|Lost manual control", CAUSE, (2001,)),
         (r"GCS Failsafe|MYGCS: .*heartbeat lost", CAUSE, (2002,)),
         (r"Battery \d+ is low ", CAUSE, (2003,)),

@@ -9,8 +9,11 @@ import pytest
 
 from mav_robot_status.config import Config
 from mav_robot_status.errors import UsageError
-from mav_robot_status.gateway.replay import replay
-from mav_robot_status.mavlink.definitions import Heartbeat
+from mav_robot_status.gateway.plant import Plant
+from mav_robot_status.gateway.recorded import Recording
+from mav_robot_status.gateway.replay import Nobody, replay, run_through
+from mav_robot_status.hardware.robot_hw import WANTED_IDS
+from mav_robot_status.mavlink.definitions import Heartbeat, MessageInterval
 from mav_robot_status.mavlink.encode import encode
 
 START_US = 1_800_000_000_000_000
@@ -29,6 +32,10 @@ def log_of(path: Path, *seconds: float) -> str:
             log.write(round(START_US + at * 1e6).to_bytes(8, "big"))
             log.write(encode(Heartbeat(0, 10, 3, 65, 4, 3), system=1, component=1, sequence=sequence))
     return str(path)
+
+
+def plant_of(stdout: TextIO) -> Plant:
+    return Plant(Config(), Nobody(), stdout, patient=True)
 
 
 def replayed(path: str, stdout: TextIO) -> list[dict[str, Any]]:
@@ -52,6 +59,39 @@ def test_a_jump_of_the_clock_begins_anew_without_lines_in_between(tmp_path: Path
     assert 15 < len(lines) < 30
     assert {line["link"]["state"] for line in lines} == {"CONNECTED"}
     assert [line["seq"] for line in lines] == list(range(len(lines)))
+
+
+def test_the_new_segment_knows_nothing_of_the_old_one(tmp_path: Path, stdout: TextIO) -> None:
+    plant = plant_of(stdout)
+    since = []
+    for _, frame in run_through(plant, Recording(log_of(tmp_path / "a.tlog", 0, 1, 90_000, 90_001))):
+        (tracked,) = plant.hw.vehicles
+        if frame is not None:
+            since.append({(inhibit.since_us - START_US) / 1e6 for inhibit in tracked.handle.detail.inhibits})
+    assert since == [{0.0}, {0.0}, {90_000.0}, {90_000.0}]
+
+
+def test_lines_continue_to_the_last_frame_even_if_nobody_wants_it(tmp_path: Path, stdout: TextIO) -> None:
+    unwanted = encode(MessageInterval(0, 0), system=1, component=1, sequence=2)
+    assert 244 not in WANTED_IDS
+    path = Path(log_of(tmp_path / "a.tlog", 0, 1))
+    path.write_bytes(path.read_bytes() + (START_US + 6_000_000).to_bytes(8, "big") + unwanted)
+    lines = replayed(str(path), stdout)
+    assert "2027-01-15T08:00:05.9" < lines[-1]["stamp"] <= "2027-01-15T08:00:06.000000Z"
+    assert lines[-1]["link"]["state"] == "LOST"
+    assert len(lines) == pytest.approx(61, abs=3)
+
+
+def test_each_instant_is_given_after_the_plant_has_lived_it(tmp_path: Path, stdout: TextIO) -> None:
+    plant = plant_of(stdout)
+    told = []
+    for now, frame in run_through(plant, Recording(log_of(tmp_path / "a.tlog", 0, 10))):
+        (tracked,) = plant.hw.vehicles
+        told.append((now.mono, frame is None, tracked.handle.detail.link.value, tracked.handle.heard_at))
+    assert told == [(0.0, False, "CONNECTED", 0.0), (10.0, False, "CONNECTED", 10.0), (10.0, True, "CONNECTED", 10.0)]
+    plant.close(now)
+    stdout.seek(0)
+    assert any(json.loads(line)["link"]["state"] == "LOST" for line in stdout)
 
 
 def test_a_missing_log_is_an_error_for_the_person(tmp_path: Path, stdout: TextIO) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from mav_robot_status.hardware.derive import INHIBITS, derive
+from mav_robot_status.hardware.derive import derive
+from mav_robot_status.hardware.fields.inhibits import INHIBITS
 from mav_robot_status.hardware.options import HardwareOptions
 from mav_robot_status.interface import Detail, RobotMode, TriState
 

@@ -22,6 +22,8 @@ def test_every_bit_weighs_what_the_specification_says(stack: Stack) -> None:
     soft = {4, 5, 6, 7, 8, 16, 17, 18, 19, 21, 22, 24, 26, 27, 29}
     if stack in (Stack.ARDUPILOT, Stack.PX4):
         soft |= {10, 11, 12, 13, 14}
+    if stack is Stack.ARDUPILOT:
+        soft -= {22}  # the recordings show it unhealthy through every good plane flight
     if stack is Stack.PX4:
         hard, soft = hard | {15}, soft - {16}
     weights = sensors.WEIGHTS[stack]

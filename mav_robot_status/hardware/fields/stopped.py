@@ -1,0 +1,84 @@
+"""e_stopped: whether an emergency stop is engaged; `estop` and `outputs` say what each autopilot shows."""
+
+from __future__ import annotations
+
+from ...interface.status import Evidence
+from .. import causes, estop, motion, outputs, sensors
+from ..hearing.movement import driving_speed
+from ..identity import HIL, Stack
+from ..observation import is_fresh
+from .view import FALSE, TERMINATED, TRUE, UNKNOWN, Finding, View, beat
+
+
+def e_stopped(view: View) -> Finding:
+    """Whether an emergency stop is engaged; see `estop` for what each autopilot shows."""
+    stack = view.memory.stack
+    if stack is Stack.PX4:
+        found = _px4_stop(view)
+    elif stack is Stack.ARDUPILOT:
+        found = _ardupilot_stop(view)
+    elif view.state == TERMINATED:
+        found = TRUE, beat(view, "state FLIGHT_TERMINATION")
+    else:
+        found = UNKNOWN, Evidence("this autopilot does not show emergency stops")
+    if found[0] is UNKNOWN and view.options.estop_unknown_as == "false":
+        return FALSE, Evidence("estop_unknown_as: false")
+    return found
+
+
+def _px4_stop(view: View) -> Finding:
+    if view.state != TERMINATED:
+        return FALSE, beat(view, "PX4 shows every stop as state FLIGHT_TERMINATION")
+    if view.heartbeat.base_mode & HIL:
+        return UNKNOWN, beat(view, "in hardware-in-the-loop older PX4 is always in lockdown")
+    return TRUE, beat(view, "state FLIGHT_TERMINATION: kill, lockdown or termination")
+
+
+def _ardupilot_stop(view: View) -> Finding:
+    memory, now = view.memory, view.now
+    stop = memory.stop
+    told = estop.still_said(stop, now)
+    if view.status is not None and sensors.safety_switch_on(view.status):
+        return TRUE, Evidence("safety switch engaged", "SYS_STATUS: MOTOR_OUTPUTS present, not enabled", view.status_at)
+    if told is TRUE:
+        return TRUE, Evidence("the autopilot said so", stop.source, stop.last)
+    latches = causes.lasting(memory.latches, memory.pulse, now, view.options.text_hold_s)
+    if 1002 in latches:
+        return TRUE, Evidence("termination announced", latches[1002].source, latches[1002].last)
+    if view.state == TERMINATED:
+        return TRUE, beat(view, "state FLIGHT_TERMINATION")
+    watched, why = _watched(view)
+    if watched is TRUE:
+        return TRUE, why
+    if not view.armed and view.status is not None and stop.ready >= estop.READY_MESSAGES:
+        return FALSE, Evidence(
+            "the pre-arm checks, which include the stop, pass", "SYS_STATUS: PREARM_CHECK", stop.ready_at
+        )
+    if told is FALSE:
+        return FALSE, Evidence("the autopilot said so", stop.source, stop.last)
+    if watched is FALSE:
+        return FALSE, why
+    if view.armed and view.options.estop_assume_visible and memory.assumed_free:
+        return FALSE, Evidence("not stopped when armed, and no text since (estop_assume_visible)")
+    return UNKNOWN, Evidence("ArduPilot does not show an emergency stop in HEARTBEAT, SYS_STATUS or texts alone")
+
+
+def _watched(view: View) -> Finding:
+    """The output watch and ESC telemetry of an armed vehicle."""
+    memory, now = view.memory, view.now
+    watch = memory.watch
+    if not view.armed or not view.options.watch_outputs:
+        return UNKNOWN, Evidence("the outputs are not watched")
+    if memory.observation.esc is not None and is_fresh(memory.observation.esc, now, motion.FRESH):
+        return FALSE, Evidence("a motor turns", "ESC telemetry: rpm", memory.observation.esc.at)
+    if watch.at is None or now > watch.at + motion.FRESH:
+        return UNKNOWN, Evidence("no fresh SERVO_OUTPUT_RAW")
+    value = outputs.verdict(watch, memory.family, memory.vehicle_type, driving_speed(memory), now)
+    motors, assumed = outputs.channels(watch, memory.vehicle_type)
+    shown = ", ".join(f"{c}: {watch.values[c - 1]} us" for c in motors if c <= len(watch.values))
+    source = f"SERVO_OUTPUT_RAW {shown}{' (assumed motor channels)' if assumed else ''}"
+    if value is TRUE:
+        return TRUE, Evidence("motor outputs held at their stop value while throttle is demanded", source, watch.at)
+    if value is FALSE:
+        return FALSE, Evidence("a motor output is off its stop value", source, watch.at)
+    return UNKNOWN, Evidence("the outputs neither drive nor are held", source, watch.at)

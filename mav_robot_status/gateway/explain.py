@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import re
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any, Final
 
@@ -91,7 +92,9 @@ def moment(at: str, start_us: int) -> int:
     try:
         if at.startswith("+"):
             return start_us + round(float(at) * 1e6)
-        time = datetime.fromisoformat(at.replace("Z", "+00:00"))
+        # Python 3.10 takes three or six decimals only
+        six = re.sub(r"\.(\d{1,6})\d*", lambda match: f".{match[1]:0<6}", at)
+        time = datetime.fromisoformat(six.replace("Z", "+00:00"))
     except (ValueError, OverflowError):
         raise UsageError(
             f"--at {at}: write a time like {rfc3339(start_us)}, or +44 for seconds from the start"

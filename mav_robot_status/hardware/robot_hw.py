@@ -23,6 +23,7 @@ from ..mavlink import definitions as mav
 from ..mavlink.decode import decode, text
 from . import horizon
 from .derive import derive
+from .fields.inhibits import inhibit
 from .fields.view import named
 from .hearing import HANDLERS, hear, overheard, pass_time
 from .identity import Stack, is_autopilot
@@ -154,6 +155,10 @@ class MavlinkRobotHW(RobotHW):
     def read(self, now: Instant) -> None:
         """Set the handles to what is so at `now`."""
         self.stirred = False
+        for tracked in self._expected:
+            if tracked.memory is None and not tracked.handle.detail.inhibits:
+                unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
+                tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
         for tracked in self._tracked.values():
             if tracked.dirty or now.mono >= tracked.deadline:
                 self._evaluate(tracked, now)

@@ -100,7 +100,7 @@ class FakeAutopilot:
     # What a test can do
 
     def set(self, **changes: Any) -> None:
-        """Change fields of `VehicleState`. Raises ValueError for a field that there is not."""
+        """Change fields of `VehicleState`. Raises ValueError (TypeError from Python 3.13) for an unknown field."""
         self.do(step(0.0, "", **changes))
 
     def do(self, step: Step) -> None:

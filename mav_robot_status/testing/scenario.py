@@ -105,7 +105,10 @@ class Scenario(NamedTuple):
 
 
 def step(at: float, note: str, *texts: tuple[int, str], action: Action | None = None, **changes: Any) -> Step:
-    """A `Step` in short: texts as (severity, text), changes as keywords. Raises ValueError for an unknown field."""
+    """A `Step` in short: texts as (severity, text), changes as keywords.
+
+    Raises ValueError (TypeError from Python 3.13) for an unknown field.
+    """
     VehicleState()._replace(**changes)
     return Step(at, note, changes, tuple(Text(*text) for text in texts), action)
 

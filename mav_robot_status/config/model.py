@@ -70,7 +70,7 @@ class ControllerConfig:
     where: str
     """`file:line:column` of the stanza."""
     publishers: tuple[PublisherConfig, ...] | None = None
-    """The parameter `publishers` of our own controller, read; None if it is not written."""
+    """The parameter `publishers`, read; None if it is not written."""
 
 
 @dataclass(frozen=True, slots=True)

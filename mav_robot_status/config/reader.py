@@ -23,7 +23,8 @@ PARAMETERS: Final[dict[str, Any]] = {
     "publish_on_change": bool,
     "publishers": tuple[PublisherConfig, ...],
 }
-"""What our own controller takes. What another type takes is for that type to check."""
+"""What our own controller takes. What another type takes is for that type to check, but for its outputs."""
+SHARED: Final = frozenset({"publishers"})
 
 
 def load(path: str | os.PathLike[str]) -> Config:
@@ -55,15 +56,11 @@ def _controller(name: str, node: Node, sections: Mapping[str, Any]) -> Controlle
         raise node.key_fault(f"{quoted(name)} is neither a section nor a controller, which has a 'type': {hint}")
     parameters = {key: value for key, value in node.value.items() if key != "type"}
     kind = read(str, node.value["type"])
-    publishers = _check_parameters(node, parameters) if kind in OUR_TYPES else None
+    if kind in OUR_TYPES:
+        entries(node._replace(value=parameters), PARAMETERS)
+    known = {key: read(PARAMETERS[key], parameters[key]) for key in parameters if key in SHARED or kind in OUR_TYPES}
     plain = {key: value.plain() for key, value in parameters.items()}
-    return ControllerConfig(name, kind, plain, (node.key or node).at, publishers)
-
-
-def _check_parameters(node: Node, parameters: dict[str, Node]) -> tuple[PublisherConfig, ...] | None:
-    entries(node._replace(value=parameters), PARAMETERS)
-    values = {key: read(PARAMETERS[key], value) for key, value in parameters.items()}
-    return values.get("publishers")
+    return ControllerConfig(name, kind, plain, (node.key or node).at, known.get("publishers"))
 
 
 def _check_hysteresis(config: Config, given: dict[str, Node]) -> None:

@@ -199,6 +199,12 @@ def test_the_parameters_of_another_type_are_its_own_affair(tmp_path: Path) -> No
     assert controller.publishers is None
 
 
+def test_the_outputs_of_another_type_are_read_like_ours(tmp_path: Path) -> None:
+    config = loaded(tmp_path, "mine: {type: other/Controller, publishers: [{type: json, path: a.jsonl}], x: 1}")
+    assert config.controllers[0].publishers == (PublisherConfig("json", {"path": "a.jsonl"}),)
+    assert config.controllers[0].parameters["x"] == 1
+
+
 def test_a_file_is_described_line_by_line(tmp_path: Path) -> None:
     text = """\
 vehicles: [{system: 2, component: 1, handle: a}, {handle: b}]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..interface.status import TriState
-from .identity import Stack
+from .identity import Family, Stack
 from .sensors import is_ready, safety_switch_on
 
 if TYPE_CHECKING:
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from ..mavlink.definitions import SysStatus
     from .pulse import Pulse
 
+HONOURED_BY: Final = frozenset({Family.COPTER, Family.PLANE, Family.ROVER})
+"""The ArduPilot vehicles whose motors an e-stop by switch or command stops. ArduSub 4.5.6 was recorded accepting the
+command and driving on, and the others were never seen with one."""
 SETTLING: Final = 2.0
 """Seconds after a disarm, a connection or a word on the stop before a healthy PREARM_CHECK bit says anything: it is
 recomputed once a second, and forced healthy while armed."""

@@ -38,7 +38,8 @@ def command_ack(memory: Memory, message: CommandAck, now: Instant, options: Hard
         if asked.param1 >= 0.5 and memory.family in TERMINATES.get(memory.stack, frozenset()):
             return memory._replace(latches=causes.announce(memory.latches, 1002, None, now, source))
         return memory
-    known = memory.stack is Stack.ARDUPILOT and asked.param1 == commands.MOTOR_ESTOP
+    honoured = memory.stack is Stack.ARDUPILOT and memory.family in estop.HONOURED_BY
+    known = honoured and asked.param1 == commands.MOTOR_ESTOP
     if known and asked.param2 in (commands.LOW, commands.HIGH):
         stop = estop.said(memory.stop, asked.param2 == commands.HIGH, None, now, source)
         return memory._replace(stop=stop, assumed_free=False)

@@ -193,6 +193,8 @@ def esc_status(memory: Memory, message: mav.EscStatus, now: Instant, options: Ha
 
 
 def _turning(memory: Memory, message: Any, rpm: tuple[int, ...], now: Instant) -> Memory:
+    before = memory.observation.esc
     if not any(rpm):
-        return memory
+        over = before is not None and type(before.message) is type(message)
+        return memory._replace(observation=memory.observation._replace(esc=None)) if over else memory
     return observed(memory, esc=heard(message, now.mono, memory.observation.esc))

@@ -71,6 +71,8 @@ def _said(memory: Memory, text: statustext.Text, now: Instant, options: Hardware
     if effect is Effect.CLEAR:
         return memory._replace(latches=causes.clear(memory.latches, rule.codes))
     if effect in (Effect.ESTOP, Effect.RELEASE):
+        if memory.pulse.armed and memory.family not in estop.HONOURED_BY:
+            return memory
         engaged = effect is Effect.ESTOP
         memory = memory._replace(stop=estop.said(memory.stop, engaged, words, now), assumed_free=False)
         return memory._replace(not_ready=_say(memory.not_ready, words, now)) if engaged else memory

@@ -46,7 +46,7 @@ def stop(flight: Flight, position: float = HIGH) -> Flight:
 # -- both halves -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("vehicle", [ROVER, QUAD, PLANE, SUB])
+@pytest.mark.parametrize("vehicle", [ROVER, QUAD, PLANE])
 def test_an_accepted_emergency_stop_is_a_stop_until_an_accepted_release(vehicle: int) -> None:
     flight = driving(vehicle=vehicle)
     assert flight.status.e_stopped is UNKNOWN

@@ -99,12 +99,19 @@ class Requests:
         self._look_at = started + LOOK
 
     def restart(self, now: float) -> None:
-        """After a reboot of the autopilot (or a link loss) all intervals are gone: look anew."""
+        """After a reboot of the autopilot all intervals are gone: look anew."""
         self._counts.clear()
         self._queue.clear()
         self._refused.clear()
         self._asked_modes = False
         self._round, self._window, self._look_at = 0, now, now + LOOK
+
+    def resume(self, now: float) -> None:
+        """After a link loss: what did not come meanwhile is not missing. The rounds and their distance stay."""
+        if self._look_at < math.inf:
+            self._counts.clear()
+            self._look_at = max(self._look_at, now + LOOK)
+            self._window = self._look_at - LOOK
 
     def arrived(self, message_id: int, now: float) -> None:
         """Count one message of this autopilot, while one is looking."""

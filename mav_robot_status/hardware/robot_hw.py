@@ -278,3 +278,5 @@ class MavlinkRobotHW(RobotHW):
             log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, self.options.heartbeat_timeout)
         elif state is LinkState.CONNECTED and before is LinkState.LOST:
             log.info("vehicle %d.%d is back", *ids)
+            if tracked.requests is not None:
+                tracked.requests.resume(tracked.handle.heard_at or 0.0)

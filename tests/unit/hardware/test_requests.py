@@ -153,6 +153,25 @@ def test_after_a_reboot_all_begins_anew(requests: Requests) -> None:
     assert answered(requests, 203.0) == [1]
 
 
+def test_what_did_not_come_while_the_link_was_lost_is_not_missing(requests: Requests) -> None:
+    assert answered(requests, 103.0) == [1]
+    requests.resume(132.0)  # lost until now
+    for number in range(4):
+        requests.arrived(1, 132.1 + number)
+    assert answered(requests, 134.9) == []
+    assert answered(requests, 135.0) == []
+
+
+def test_a_link_that_flaps_is_not_asked_more_often(requests: Requests) -> None:
+    assert answered(requests, 103.0) == [1]
+    for second in range(105, 120):
+        requests.resume(float(second))
+    assert answered(requests, 132.9) == []
+    assert answered(requests, 133.0) == [1]
+    requests.resume(170.0)
+    assert [answered(requests, float(t)) for t in (173, 200, 400)] == [[], [], []]
+
+
 def test_the_modes_are_asked_for_once(requests: Requests) -> None:
     first = asked(requests, 103.0, (), True)
     assert first is not None

@@ -55,6 +55,7 @@ def of_movement(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
         gps.speed is None,
         not memory.pulse.armed and speed_over_ground(memory) > options.v_on_disarmed,
         watch.driven,
+        seen.esc is not None and outputs.is_at_stop(watch, memory.vehicle_type),
         watch.held_since,
         held and outputs.is_vetoed(watch, memory.family, driving_speed(memory)),
         seen.vfr_hud if held else None,  # a speed that grows vetoes

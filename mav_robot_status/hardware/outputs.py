@@ -127,6 +127,13 @@ def heard_beat(
     return watch._replace(stop=stop, candidate=())
 
 
+def is_at_stop(watch: Watch, vehicle_type: int) -> bool:
+    """Whether every motor output is known to be at its stop value: what turns then is not driven."""
+    motors, _ = channels(watch, vehicle_type)
+    known = [(watch.values[c - 1], watch.stop[c]) for c in motors if c in watch.stop and c <= len(watch.values)]
+    return len(known) == len(motors) > 0 and all(abs(value - stop) <= OFF_STOP for value, stop in known)
+
+
 def is_vetoed(watch: Watch, family: Family, speed: float) -> bool:
     """Whether `speed` (`hearing.movement.driving_speed`) says that something drives though the outputs are held.
 

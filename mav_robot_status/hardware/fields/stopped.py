@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...interface.status import Evidence
 from .. import causes, estop, motion, outputs, sensors
 from ..hearing.movement import driving_speed
-from ..identity import HIL, Stack
+from ..identity import HIL, Family, Stack
 from ..observation import is_fresh
 from .view import FALSE, TERMINATED, TRUE, UNKNOWN, Finding, View, beat
 
@@ -69,9 +69,15 @@ def _watched(view: View) -> Finding:
     watch = memory.watch
     if not view.armed or not view.options.watch_outputs:
         return UNKNOWN, Evidence("the outputs are not watched")
-    if memory.observation.esc is not None and is_fresh(memory.observation.esc, now, motion.FRESH):
-        return FALSE, Evidence("a motor turns", "ESC telemetry: rpm", memory.observation.esc.at)
-    if watch.at is None or now > watch.at + motion.FRESH:
+    fresh = watch.at is not None and now <= watch.at + motion.FRESH
+    turning = memory.observation.esc
+    if turning is not None and is_fresh(turning, now, motion.FRESH):
+        # recorded: a plane's propeller turns on after a stop; wheels turn the motors of a rover that coasts
+        if memory.family is not Family.PLANE and not (fresh and outputs.is_at_stop(watch, memory.vehicle_type)):
+            return FALSE, Evidence("a motor turns", "ESC telemetry: rpm", turning.at)
+        if not (fresh and watch.driven):
+            return UNKNOWN, Evidence("a motor turns, perhaps without being driven", "ESC telemetry: rpm", turning.at)
+    if not fresh:
         return UNKNOWN, Evidence("no fresh SERVO_OUTPUT_RAW")
     value = outputs.verdict(watch, memory.family, memory.vehicle_type, driving_speed(memory), now)
     motors, assumed = outputs.channels(watch, memory.vehicle_type)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mav_robot_status.clock import Instant, later
+from mav_robot_status.hardware import outputs
 from mav_robot_status.hardware.derive import derive
 from mav_robot_status.hardware.hearing import hear, overheard
 from mav_robot_status.hardware.memory import Memory, begin
@@ -42,10 +43,23 @@ def test_a_live_vehicle_that_does_not_stop_is_not_called_stopped(vehicle_type: i
     assert e_stopped(hear(asked, ACCEPTED, START, OPTIONS)) is TriState.UNKNOWN
 
 
-def test_a_motor_that_no_longer_turns_is_no_evidence() -> None:
-    def telemetry(rpm: int) -> mav.EscTelemetry1To4:
-        return mav.EscTelemetry1To4(bytes(8), bytes(8), bytes(8), rpm.to_bytes(2, "little") * 4, bytes(8), bytes(4))
+def telemetry(rpm: int) -> mav.EscTelemetry1To4:
+    return mav.EscTelemetry1To4(bytes(8), bytes(8), bytes(8), rpm.to_bytes(2, "little") * 4, bytes(8), bytes(4))
 
-    turning = hear(armed(FIXED_WING), telemetry(4000), START, OPTIONS)
+
+def test_a_motor_that_no_longer_turns_is_no_evidence() -> None:
+    turning = hear(armed(QUADROTOR), telemetry(4000), START, OPTIONS)
     assert e_stopped(turning) is TriState.FALSE
     assert e_stopped(hear(turning, telemetry(0), later(START, 0.5), OPTIONS)) is TriState.UNKNOWN
+
+
+def test_a_propeller_that_the_wind_may_turn_is_no_evidence() -> None:
+    assert e_stopped(hear(armed(FIXED_WING), telemetry(4000), START, OPTIONS)) is TriState.UNKNOWN
+
+
+@pytest.mark.parametrize(("throttle_us", "expected"), [(1500, TriState.UNKNOWN), (1650, TriState.FALSE)])
+def test_motors_that_turn_while_their_outputs_are_at_stop_may_only_coast(throttle_us: int, expected: TriState) -> None:
+    rover = hear(armed(GROUND_ROVER), telemetry(900), START, OPTIONS)
+    values = (0,) * 2 + (throttle_us,) + (0,) * 13
+    watch = outputs.Watch(stop={3: 1500}, driven=throttle_us != 1500, at=START.mono, values=values)
+    assert e_stopped(rover._replace(watch=watch)) is expected

@@ -52,8 +52,8 @@ class Frame(NamedTuple):
     component: int
     sequence: int
     payload: bytes
-    signature: bytes
-    """The 13 bytes of MAVLink 2's signature block (link id, timestamp, signature), not verified; b"" if unsigned."""
+    raw: bytes
+    """The whole frame as received, if it is signed (not verified) or the parser keeps everything; else b""."""
     version: int
     """1 or 2."""
     stamp: bytes = b""
@@ -114,13 +114,14 @@ def known_ids(wanted: frozenset[int]) -> dict[bytes | int, tuple[bytes, int, boo
 class Parser:
     """Finds the frames in the bytes of one link or log; they may be cut anywhere from feed to feed.
 
-    `wanted` are the message ids that `feed` returns; frames of other ids are checked and counted, no more.
+    `wanted` are the message ids that `feed` returns; frames of other ids are checked and counted, no more. None: every
+    frame is returned with its `raw` bytes, also those of unknown ids, which cannot be checked (to pass them on).
     `stamp_size` bytes stand before each frame (8 in a recorded log) that are no MAVLink and are handed on with it.
     """
 
-    __slots__ = ("_expected", "_in_step", "_lookup", "_stamp_size", "_tail", "counters", "last_stamp")
+    __slots__ = ("_expected", "_in_step", "_keep_all", "_lookup", "_stamp_size", "_tail", "counters", "last_stamp")
 
-    def __init__(self, wanted: Collection[int], stamp_size: int = 0) -> None:
+    def __init__(self, wanted: Collection[int] | None, stamp_size: int = 0) -> None:
         self.counters = Counters()
         self._stamp_size = stamp_size
         self.last_stamp = b""
@@ -128,7 +129,8 @@ class Parser:
         self._tail = b""
         self._in_step = True
         self._expected: dict[bytes, int] = {}  # (system, component) -> sequence number of the next frame
-        self._lookup = known_ids(frozenset(wanted)).get
+        self._keep_all = wanted is None
+        self._lookup = known_ids(frozenset(CRC_EXTRA if wanted is None else wanted)).get
 
     @property
     def pending(self) -> int:
@@ -153,6 +155,7 @@ class Parser:
         mirrored = data.translate(MIRROR)
         lookup = self._lookup
         expected = self._expected
+        keep_all = self._keep_all
         frames: list[Frame] = []
         good = 0
         stamped = i = self._stamp_size
@@ -191,6 +194,8 @@ class Parser:
                 doubtful = i
                 i = self._doubt(data, mirrored, i, following)
                 if self._in_step and i > doubtful:
+                    if keep_all and entry is None and i == following + stamped:
+                        frames.append(_unchecked(data, doubtful, start, end, following))
                     continue
                 break
             before, i = i, following + stamped
@@ -209,10 +214,10 @@ class Parser:
             good += 1
             if entry[2]:
                 payload = data[start:end]
-                signature = data[end + 2 : following]
+                raw = data[before:following] if keep_all or flags == SIGNED else b""
                 version = 1 if flags == OLD else 2
                 stamp = data[before - stamped : before]
-                frames.append(Frame(entry[1], source[0], source[1], sequence, payload, signature, version, stamp))
+                frames.append(Frame(entry[1], source[0], source[1], sequence, payload, raw, version, stamp))
         self._tail = data[i - stamped :]
         if stamped and before >= 0:
             self.last_stamp = data[before - stamped : before]
@@ -297,3 +302,11 @@ class Parser:
             return OPEN
         crc = crc_hqx(entry[0], crc_hqx(mirrored[i + 1 : end], 0xFFFF))
         return VALID if crc == CRC(mirrored, end)[0] else WRONG
+
+
+def _unchecked(data: bytes, i: int, start: int, end: int, following: int) -> Frame:
+    """A frame of an unknown id, as its header says it is."""
+    raw = data[i:following]
+    if raw[0] == V2:
+        return Frame(int.from_bytes(raw[7:10], "little"), raw[5], raw[6], raw[4], data[start:end], raw, 2)
+    return Frame(raw[5], raw[3], raw[4], raw[2], data[start:end], raw, 1)

@@ -252,11 +252,29 @@ def test_signed_frames_bring_their_signature_block() -> None:
     mav.signing.timestamp = 1234567890
     packed = mav.heartbeat_encode(2, 3, 209, 4, 4).pack(mav)
     (frame, following), counters = feed(packed + heartbeat())
-    assert frame.signature == packed[-13:]
-    assert frame.signature[0] == 3
+    assert frame.raw == packed
+    assert frame.raw[-13] == 3
     assert frame.payload == following.payload
-    assert following.signature == b""
+    assert following.raw == b""
     assert counters == Counters(frames=2, signed=1)
+
+
+def test_a_parser_that_keeps_everything_gives_each_frame_as_it_came_also_unknown_ones() -> None:
+    attitude = encode(ATTITUDE, system=7, component=1, sequence=4, version=1)
+    stream = [heartbeat(3), unknown_frame(b"abc", 4), attitude, unknown_frame(bytes(40), 5), heartbeat(6)]
+    parser = Parser(None)
+    frames = parser.feed(b"".join(stream))
+    assert [frame.raw for frame in frames] == stream
+    assert [frame.message_id for frame in frames] == [0, UNKNOWN_ID, 30, UNKNOWN_ID, 0]
+    assert (frames[1].system, frames[1].component, frames[1].sequence, frames[1].payload) == (1, 1, 4, b"abc")
+    assert parser.counters == Counters(frames=3, frames_v1=1, unknown={UNKNOWN_ID: 2})
+
+
+def test_an_unknown_frame_of_mavlink_1_is_kept_with_the_ids_of_its_header() -> None:
+    unknown = bytes([0xFE, 2, 9, 5, 6, 244, 1, 2, 3, 4])  # 244 is known; 237 is nobody's
+    unknown = bytes([0xFE, 2, 9, 5, 6, 10, 1, 2, 3, 4])
+    (frame, _) = Parser(None).feed(unknown + heartbeat())
+    assert frame == Frame(10, 5, 6, 9, b"\x01\x02", unknown, 1)
 
 
 def test_unknown_incompatibility_flags_are_counted_and_the_frame_is_not_delivered() -> None:

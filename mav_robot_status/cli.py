@@ -6,13 +6,14 @@ import argparse
 import contextlib
 import dataclasses
 import logging
+import os
 import signal
 import sys
 import threading
 from typing import TYPE_CHECKING, Final
 
 from . import __version__
-from .config import Config, ControllerConfig, LinkConfig, PublisherConfig, VehicleConfig, describe
+from .config import Config, ControllerConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig, describe
 from .config import load as load_config
 from .errors import MavRobotStatusError, NothingHeardError, UsageError
 from .interface import DEFAULT_HANDLE_NAME
@@ -23,6 +24,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 PROGRAM: Final = "mav-robot-status"
+OVERRIDES: Final = (
+    "out", "rate", "changes_only", "json", "format", "system", "baud", "passive", "signing_key", "record", "forward",
+    "http", "http_token_file", "http_open",
+)  # fmt: skip
+"""Options that override the configuration."""
 FORMATS: Final = ("native", "ros1", "ros2")
 
 
@@ -63,8 +69,12 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError(f"no connection given; write for example {PROGRAM} udp:127.0.0.1:14550")
     urls = [parse(link.url) for link in config.links]
     logs = [url for url in urls if url.kind == "log"]
+    if logs and options.http is not None:
+        raise UsageError(f"{logs[0].text}: a recorded log has no live page; write `{PROGRAM} report {logs[0].text}`")
     if logs and (len(urls) > 1 or config.outs):
         raise UsageError(f"{logs[0].text}: a recorded log is replayed alone, without other connections or --out")
+    if logs and (config.record is not None or config.forward):
+        raise UsageError(f"{logs[0].text}: a recorded log is only replayed, without --record and --forward")
     if logs:
         from .gateway.replay import replay
 
@@ -99,12 +109,62 @@ def explain(options: argparse.Namespace) -> int:
     return 0
 
 
+def doctor(options: argparse.Namespace) -> int:
+    """Why is there no status? 0: one can be had on every connection, 1: not."""
+    _log_to_stderr(options)
+    from .gateway.doctor.listen import examine
+    from .gateway.doctor.report import as_json, as_text
+
+    config = overridden(load_config(options.config) if options.config else Config(), options)
+    if not config.links:
+        raise UsageError(f"no connection given; write for example {PROGRAM} doctor udp:127.0.0.1:14550")
+    for link in config.links:  # what is no connection shows now, before the first is listened to
+        parse(link.url)
+    ok = True
+    for link in config.links:
+        found, diagnosis = examine(config, link, options.seconds)
+        ok = ok and diagnosis.ok
+        print(as_json(found, diagnosis) if options.as_json else as_text(found, diagnosis), flush=True)  # noqa: T201
+    return 0 if ok else 1
+
+
+def report(options: argparse.Namespace) -> int:
+    """Recorded logs as a picture, or added up as JSON."""
+    _log_to_stderr(options)
+    from .gateway.report import watch
+    from .views.progress import ProgressLine
+    from .views.report import as_html, as_json, save
+    from .views.timeline import TimelineBuilder
+
+    config = load_config(options.config) if options.config else Config()
+    if options.system is not None:
+        config = _only(config, options.system)
+    timelines = []
+    for path in options.logs:
+        builder = TimelineBuilder(os.path.basename(path))
+        with contextlib.closing(ProgressLine(sys.stderr, f"reading {builder.timeline.name}")) as progress:
+            summary = watch(config, path, builder, progress)
+        logging.getLogger(__name__).info("%s", summary)
+        timelines.append(builder.timeline)
+    if not any(timeline.vehicles for timeline in timelines):
+        raise NothingHeardError("no autopilot was heard, so there is nothing to show")
+    if options.as_json:
+        print(as_json(timelines))  # noqa: T201
+    if options.output or not options.as_json:
+        output = options.output or f"{os.path.splitext(timelines[0].name)[0]}.html"
+        save(as_html(timelines, f"{PROGRAM} {__version__}"), output)
+        if not options.as_json:
+            print(output)  # noqa: T201
+    return 0
+
+
 def demo(options: argparse.Namespace) -> int:
     """A fake autopilot and the gateway, in one process."""
     _log_to_stderr(options)
-    from .demo import run_demo
+    from .demo import DEMO_CONTROLLER, run_demo
 
-    run_demo(sys.stdout, loop=options.loop)
+    page = _with_page((DEMO_CONTROLLER,), options)
+    run_demo(sys.stdout, loop=options.loop, controllers=page)
     return 0
 
 
@@ -130,6 +190,8 @@ def dialect(options: argparse.Namespace) -> int:
 COMMANDS: Final[dict[str, Callable[[argparse.Namespace], int]]] = {
     "run": run,
     "explain": explain,
+    "doctor": doctor,
+    "report": report,
     "demo": demo,
     "check-config": check_config,
     "dialect": dialect,
@@ -138,7 +200,7 @@ COMMANDS: Final[dict[str, Callable[[argparse.Namespace], int]]] = {
 
 def overridden(config: Config, options: argparse.Namespace) -> Config:
     """The configuration with what the command line says instead."""
-    links = tuple(LinkConfig(url, options.passive) for url in options.connections) or config.links
+    links = tuple(LinkConfig(url, bool(options.passive)) for url in options.connections) or config.links
     if options.passive:
         links = tuple(dataclasses.replace(link, passive=True) for link in links)
     if options.baud is not None:
@@ -149,7 +211,21 @@ def overridden(config: Config, options: argparse.Namespace) -> Config:
             raise UsageError(f"{out.url!r} is a log, and an out is sent to: write one like udpout:192.168.1.20:14550")
     if options.system is not None:
         config = _only(config, options.system)
-    return dataclasses.replace(config, links=links, outs=outs, controllers=_controllers(config, options))
+    return dataclasses.replace(
+        config,
+        links=links,
+        outs=outs,
+        controllers=_with_page(_controllers(config, options), options),
+        signing=_signing(config.signing, options.signing_key),
+        record=config.record if options.record is None else options.record,
+        forward=config.forward or bool(options.forward),
+    )
+
+
+def _signing(section: SigningConfig | None, key_file: str | None) -> SigningConfig | None:
+    if key_file is None:
+        return section
+    return SigningConfig(key_file) if section is None else dataclasses.replace(section, key_file=key_file)
 
 
 def _only(config: Config, system: int) -> Config:
@@ -196,6 +272,33 @@ def _controllers(config: Config, options: argparse.Namespace) -> tuple[Controlle
     return tuple(changed)
 
 
+def _with_page(controllers: tuple[ControllerConfig, ...], options: argparse.Namespace) -> tuple[ControllerConfig, ...]:
+    """The controllers with the web page of the command line, instead of one in the configuration."""
+    if options.http is None:
+        for option in ("http_token_file", "http_open"):
+            if getattr(options, option):
+                raise UsageError(f"--{option.replace('_', '-')} is for a web page: add --http 127.0.0.1:8765")
+        return controllers
+    from .gateway.plant import DEFAULT_CONTROLLER, DEFAULT_PUBLISHERS
+
+    asked: dict[str, object] = {"listen": options.http}
+    if options.http_token_file:
+        asked["token_file"] = options.http_token_file
+    if options.http_open:
+        asked["open"] = True
+    page = PublisherConfig("http", asked)
+    return tuple(
+        dataclasses.replace(
+            c,
+            publishers=(
+                *(p for p in (DEFAULT_PUBLISHERS if c.publishers is None else c.publishers) if p.type != "http"),
+                page,
+            ),
+        )
+        for c in controllers or (DEFAULT_CONTROLLER,)
+    )
+
+
 def _with_baud(url: str, baud: int) -> str:
     parsed = parse(url, baud)
     return f"{parsed.device},{parsed.baud}" if parsed.kind == "serial" else url
@@ -209,6 +312,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="The command `run` may be left out.",
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    parser.set_defaults(**dict.fromkeys(OVERRIDES))  # for the commands that do not have them all
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     runs = commands.add_parser(
@@ -226,6 +330,10 @@ def _parser() -> argparse.ArgumentParser:
     runs.add_argument("--format", choices=FORMATS, help="form of the JSON lines (native)")
     runs.add_argument("--system", type=_system, metavar="N", help="only the vehicle with this system id")
     runs.add_argument("--baud", type=_baud, metavar="N", help="baud rate of serial connections (57600)")
+    runs.add_argument("--signing-key", metavar="FILE", help="sign what is sent, believe only what is signed")
+    runs.add_argument("--record", metavar="FILE", help="record everything received and sent")
+    _web(runs)
+    runs.add_argument("--forward", action="store_true", help="pass every frame on between the links and the outs")
     runs.add_argument("--passive", action="store_true", help="never send anything on the vehicle links")
     _verbosity(runs)
 
@@ -241,12 +349,39 @@ def _parser() -> argparse.ArgumentParser:
     explains.add_argument("--config", metavar="FILE", help="configuration (YAML)")
     explains.add_argument("--system", type=_system, metavar="N", help="only the vehicle with this system id")
     explains.add_argument("--baud", type=_baud, metavar="N", help="baud rate of serial connections (57600)")
+    explains.add_argument("--signing-key", metavar="FILE", help="believe only what is signed with this key")
     explains.add_argument("--passive", action="store_true", help="never send anything on the vehicle links")
-    explains.set_defaults(out=None, rate=None, json=None, format=None, changes_only=False)
     _verbosity(explains)
+
+    doctors = commands.add_parser(
+        "doctor",
+        help="why is there no status? what is found on a connection, and the one next action",
+        epilog=help_text(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    doctors.add_argument("connections", nargs="*", metavar="CONNECTION", help="what to listen to; see below")
+    doctors.add_argument(
+        "--seconds", type=_seconds, metavar="S", default=5.0, help="listen so long, from the first heartbeat on (5)"
+    )
+    doctors.add_argument("--as-json", action="store_true", help="as JSON, one object for each connection")
+    doctors.add_argument("--config", metavar="FILE", help="configuration (YAML)")
+    doctors.add_argument("--system", type=_system, metavar="N", help="only the vehicle with this system id")
+    doctors.add_argument("--baud", type=_baud, metavar="N", help="baud rate of serial connections (57600)")
+    doctors.add_argument("--signing-key", metavar="FILE", help="believe only what is signed with this key")
+    doctors.add_argument("--passive", action="store_true", help="never send anything on the connections")
+    _verbosity(doctors)
+
+    reports = commands.add_parser("report", help="recorded logs as a picture: one HTML file that needs nothing else")
+    reports.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log (.tlog)")
+    reports.add_argument("-o", "--output", metavar="FILE.html", help="where to write (the log's name with .html, here)")
+    reports.add_argument("--as-json", action="store_true", help="totals and intervals as JSON instead, or besides -o")
+    reports.add_argument("--config", metavar="FILE", help="configuration (YAML)")
+    reports.add_argument("--system", type=_system, metavar="N", help="only the vehicle with this system id")
+    _verbosity(reports)
 
     demos = commands.add_parser("demo", help="a fake autopilot and the gateway in one process; about 30 s")
     demos.add_argument("--loop", action="store_true", help="begin again when it ends")
+    _web(demos)
     _verbosity(demos)
 
     checks = commands.add_parser("check-config", help="what a configuration means, or where its fault is")
@@ -255,6 +390,12 @@ def _parser() -> argparse.ArgumentParser:
     dialects = commands.add_parser("dialect", help="write the dialect's XML, and Lua for Wireshark")
     dialects.add_argument("-o", "--output", metavar="DIR", default=".", help="folder to write to (this one)")
     return parser
+
+
+def _web(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--http", metavar="HOST:PORT", help="the statuses as a live web page, e.g. on 127.0.0.1:8765")
+    parser.add_argument("--http-token-file", metavar="FILE", help="show the page's data only to who has this token")
+    parser.add_argument("--http-open", action="store_true", help="show them to everybody who can reach HOST:PORT")
 
 
 def _verbosity(parser: argparse.ArgumentParser) -> None:
@@ -268,6 +409,13 @@ def _rate(text: str) -> float:
         if abs(rate := float(text)) <= 1000:
             return rate
     raise argparse.ArgumentTypeError(f"{text!r} is not a rate; write a number of Hz up to 1000, 0 for none")
+
+
+def _seconds(text: str) -> float:
+    with contextlib.suppress(ValueError):
+        if 0 < (seconds := float(text)) <= 3600:
+            return seconds
+    raise argparse.ArgumentTypeError(f"{text!r} is no time to listen; write a number of seconds up to 3600")
 
 
 def _system(text: str) -> int:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 
-from .model import Config, ControllerConfig, IdentityConfig, LinkConfig, PublisherConfig, VehicleConfig
+from .model import Config, ControllerConfig, IdentityConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
 
 __all__ = [
     "Config",
@@ -15,6 +15,7 @@ __all__ = [
     "IdentityConfig",
     "LinkConfig",
     "PublisherConfig",
+    "SigningConfig",
     "VehicleConfig",
     "describe",
     "load",

@@ -27,6 +27,8 @@ class LinkConfig:
     """As `link.url.parse` takes it; it was checked."""
     passive: bool = False
     """Nothing is ever sent there."""
+    robot_status: Annotated[bool | None, Or("auto")] = None
+    """Whether ROBOT_STATUS is sent to the vehicles there; None: yes, but not on serial lines, which are narrow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,19 @@ class IdentityConfig:
     component: Annotated[int, Id] = 192
     heartbeat: bool = True
     """Send a HEARTBEAT of our own."""
+
+
+@dataclass(frozen=True, slots=True)
+class SigningConfig:
+    """MAVLink 2 signing: what we send is signed, and what comes in is believed only with a signature."""
+
+    key_file: str
+    """As `gateway.keys.read_key` takes it; it was not opened."""
+    accept_unsigned: Literal["none", "radio_status", "all"] = "radio_status"
+    """What is taken without a signature: telemetry radios have no key to sign their RADIO_STATUS with."""
+    link_id: Annotated[int, Within(0, 255)] = 192
+    """Of our first link; each further link and out has the next. Only senders with our system and component ids must
+    use others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +101,13 @@ class Config:
     hardware: HardwareOptions = field(default_factory=HardwareOptions)
     requests: Literal["missing", "none"] = "missing"
     """Whether a message that is needed and does not come is asked for."""
+    signing: Annotated[SigningConfig | None, Or("none")] = None
+    """None: nothing is signed or verified."""
     coalesce: Annotated[float, Within(0.0, 1.0, "s")] = 0.0
     """Seconds to let input gather before it is read: fewer wake-ups for as much delay."""
+    forward: bool = False
+    """Pass every frame on between the links and the outs, by MAVLink's routing rules."""
+    record: Annotated[str | None, Or("none")] = None
+    """The .tlog file that takes everything received and sent."""
     controllers: tuple[ControllerConfig, ...] = ()
     """Empty: the default controller."""

@@ -37,9 +37,13 @@ def read(hint: Any, node: Node) -> Any:
 
 
 def read_fields(cls: Any, node: Node) -> Any:
-    """A mapping as a dataclass; what is not written has the field's default."""
+    """A mapping as a dataclass; what is not written has the field's default, if it has one."""
     hints = get_type_hints(cls, include_extras=True)
-    return cls(**{key: read(hints[key], value) for key, value in entries(node, hints).items()})
+    given = entries(node, hints)
+    for field in dataclasses.fields(cls):
+        if field.name not in given and field.default is field.default_factory:  # both are MISSING
+            raise node.fault(f"{node.name} has no '{field.name}', and must have one")
+    return cls(**{key: read(hints[key], value) for key, value in given.items()})
 
 
 def entries(node: Node, known: Iterable[str] | None = None) -> dict[str, Node]:
@@ -113,6 +117,8 @@ def _annotated(hint: Any, node: Node) -> Any:
         base = next(kind for kind in get_args(base) if kind is not type(None))
     if (names := by_type.get(OneOf)) is not None:
         return _one_of(node.text, names.names, node)
+    if dataclasses.is_dataclass(base):
+        return read_fields(base, node)
     return _number(base, node, by_type.get(Within), word)
 
 

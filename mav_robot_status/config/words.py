@@ -8,7 +8,7 @@ from dataclasses import fields
 from ..hardware.options import HardwareOptions
 from ..interface import DEFAULT_HANDLE_NAME
 from ..link import url
-from .model import Config, ControllerConfig, LinkConfig, VehicleConfig
+from .model import Config, ControllerConfig, LinkConfig, SigningConfig, VehicleConfig
 from .reader import OUR_TYPES
 
 
@@ -23,6 +23,7 @@ def describe(config: Config) -> list[str]:
         f"identity: {_identity(config)}",
         *_options(config.hardware),
         f"requests: {_REQUESTS[config.requests]}",
+        *([f"signing: {_signing(config.signing)}"] if config.signing else []),
         *([f"coalesce: input gathers for {config.coalesce * 1000:g} ms before it is read"] if config.coalesce else []),
         *(f"controller {controller.name}: {_controller(controller)}" for controller in config.controllers),
         *([] if config.controllers else ["controller: the default one for each handle"]),
@@ -32,6 +33,11 @@ def describe(config: Config) -> list[str]:
 _REQUESTS = {
     "missing": "messages that are needed and do not come are asked for",
     "none": "nothing is asked of the autopilot",
+}
+_UNSIGNED = {
+    "none": "nothing is taken unsigned",
+    "radio_status": "nothing but RADIO_STATUS is taken unsigned",
+    "all": "everything is taken unsigned too, so nothing that comes in is protected",
 }
 
 
@@ -52,6 +58,12 @@ def _identity(config: Config) -> str:
     system = f"system {identity.system}" if identity.system is not None else "the vehicle's own system"
     heartbeat = "with" if identity.heartbeat else "without"
     return f"{system}, component {identity.component}, {heartbeat} a HEARTBEAT of its own"
+
+
+def _signing(signing: SigningConfig) -> str:
+    return (
+        f"with the key in {signing.key_file}, link ids from {signing.link_id} on; {_UNSIGNED[signing.accept_unsigned]}"
+    )
 
 
 def _options(options: HardwareOptions) -> Iterator[str]:

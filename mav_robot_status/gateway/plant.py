@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from ..interface import MavlinkPort, Publisher
     from ..mavlink.framing import Frame
 
-DEFAULT_PUBLISHERS: Final = (PublisherConfig("json"), PublisherConfig("mavlink"))
+DEFAULT_PUBLISHERS: Final = (PublisherConfig("json"), PublisherConfig("mavlink"), PublisherConfig("mirror"))
+LIVE_PUBLISHERS: Final = frozenset({"mavlink", "mirror", "http"})
+"""Those that a replay does without: there is nobody to hear MAVLink, and a page would show the end of the log."""
 DEFAULT_CONTROLLER: Final = ControllerConfig(
     "robot_status_controller", "mav_robot_status/IndustrialRobotStatusController", {}, "default"
 )
@@ -82,7 +84,7 @@ class Plant:
         self.hw = MavlinkRobotHW(config.hardware, slots, config.identity.component)
         self._config = config
         self._controllers = config.controllers or (DEFAULT_CONTROLLER,)
-        self._context = PublisherContext({}, port, stdout, patient)
+        self._context = PublisherContext({}, port, stdout, patient, self.explain)
         self.publishers: dict[tuple[str, str], Publisher] = {}
         self._posts: list[_Post] = []
         self._named = {slot.handle for slot in slots}
@@ -98,9 +100,20 @@ class Plant:
             self._attend()
             undo.pop_all()
 
+    def publishes(self, kind: str) -> bool:
+        """Whether there is a publisher of this type."""
+        return any(name == kind for name, _ in self.publishers)
+
     def take(self, frame: Frame, now: Instant) -> Tracked | None:
         """Take one frame; the vehicle if it is an autopilot's heartbeat."""
         return self.hw.take(frame, now)
+
+    def explain(self, handle: str, now: Instant) -> dict[str, Any] | None:
+        """Why each field of a handle has its value; None if its vehicle was not heard."""
+        from .explain import explanation  # it is built on this module, and wanted only while somebody looks
+
+        tracked = self.hw.explained(handle, now)
+        return None if tracked is None else explanation(tracked, now)
 
     def tick(self, now: Instant) -> None:
         """Read the hardware, update the controllers, let the publishers do what waits."""
@@ -182,8 +195,8 @@ class Plant:
             self._posts.append(_Post(config.name, controller, controller.handle))
 
     def _publishers(self, config: ControllerConfig) -> list[Publisher]:
-        """The publishers of a controller; on replay there is nobody to hear MAVLink."""
-        heard = [p for p in _publishers(config) if p.type != "mavlink" or not self._context.patient]
+        """The publishers of a controller; on replay without those for the living."""
+        heard = [p for p in _publishers(config) if p.type not in LIVE_PUBLISHERS or not self._context.patient]
         return [self._publisher(p, config.where) for p in heard]
 
     def _publisher(self, config: PublisherConfig, where: str) -> Publisher:

@@ -25,8 +25,10 @@ OURS: Final[dict[str, dict[str, str]]] = {
         ),
     },
     PUBLISHERS: {
+        "http": "mav_robot_status.publishers.web.publisher:HttpPublisher",
         "json": "mav_robot_status.publishers.json_lines:JsonLinesPublisher",
         "mavlink": "mav_robot_status.publishers.mavlink:MavlinkPublisher",
+        "mirror": "mav_robot_status.publishers.mirror:MirrorPublisher",
     },
 }
 

@@ -35,6 +35,11 @@ class Recording:
                 "no MAVLink frame with a time stamp in it; a .tlog is needed"
             )
 
+    @property
+    def share(self) -> float:
+        """How much of the log was read, from 0 to 1."""
+        return self._reader.given / self._reader.size
+
     def summary(self) -> str:
         """One line for the person: what was read, and of what was wrong only what occurred."""
         counters = self._parser.counters

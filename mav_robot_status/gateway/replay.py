@@ -11,10 +11,11 @@ from .plant import Plant
 from .recorded import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Hashable, Iterable, Iterator, Sequence
     from typing import TextIO
 
     from ..config import Config
+    from ..interface import Audience
     from ..link.log import Stamped
     from ..mavlink.framing import Frame
 
@@ -29,7 +30,15 @@ NEVER: Final = Instant(0.0, 0)
 class Nobody:
     """The MAVLink port of a replay: there is nobody to send to."""
 
-    def send(self, message: Any, system: int) -> None:
+    def audiences(self) -> Sequence[Audience]:
+        """Nobody."""
+        return ()
+
+    def requests(self) -> Collection[tuple[Hashable, int]]:
+        """Nobody asks."""
+        return ()
+
+    def send(self, message: Any, system: int, audience: Audience) -> None:
         """Send nothing."""
 
 

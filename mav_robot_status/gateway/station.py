@@ -1,7 +1,8 @@
-"""One live link and who is on it."""
+"""One live link, and a channel for each of its other ends."""
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Final
 
@@ -11,72 +12,134 @@ from ..link.url import parse
 from ..mavlink.framing import Counters, Parser
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ..config import LinkConfig
     from ..link.base import Address, Link
+    from ..mavlink.encode import Encoder
 
 MOST_SOURCES: Final = 64
-"""Addresses on one link whose cut frames are put together; the longest silent is let go."""
+"""Channels of one link; the longest silent is let go."""
 MOST_PEERS: Final = 8
 PEER_SILENCE: Final = 30.0  # s
-SPEAKS_FIRST: Final = frozenset({"udpout", "udpbcast", "tcp"})
+MUST_SPEAK: Final = frozenset({"udpout", "udpbcast", "tcp"})
+"""Kinds of link where nobody knows of us before we have sent something."""
+ONE_END: Final = MUST_SPEAK | {"serial"}
+NEVER: Final = -math.inf
+
+
+class Channel:
+    """One other end of a link: MAVLink's channel, with sequence numbers of its own. Compared by identity."""
+
+    __slots__ = ("encoders", "heard_at", "interval", "parser", "source", "station")
+
+    def __init__(self, station: Station, source: Address, parser: Parser) -> None:
+        self.station = station
+        self.source = source
+        """Where to send to; None: the link knows."""
+        self.parser = parser
+        self.heard_at = NEVER
+        """When (monotonic seconds) an autopilot's heartbeat last came from here, on an out anybody's."""
+        self.interval: float | None = None
+        """Seconds between two ROBOT_STATUS, as asked for from here; None: the default, inf: none."""
+        self.encoders: dict[int, Encoder] = {}
+        """By our system id."""
+
+    @property
+    def is_out(self) -> bool:
+        """Whether it leads to ground stations rather than to vehicles."""
+        return self.station.is_out
+
+    @property
+    def passive(self) -> bool:
+        """Whether nothing may ever be sent there."""
+        return self.station.passive
+
+    def __str__(self) -> str:
+        """In words: `10.1.2.3:14550, listening on 0.0.0.0:14550/udp`."""
+        text = self.station.link.text
+        return f"{self.source[0]}:{self.source[1]}, {text}" if isinstance(self.source, tuple) else text
+
+    def send(self, frame: bytes) -> bool:
+        """Send to this end; False if it could not be sent, or nothing may ever be."""
+        return not self.station.passive and self.station.link.send(frame, self.source)
 
 
 class Station:
     """One link with what was heard on it. Bounded, however many addresses there are that send."""
 
-    def __init__(self, config: LinkConfig, is_out: bool) -> None:
-        """Open the link. Raises LinkError, UsageError."""
+    def __init__(self, config: LinkConfig, is_out: bool = False, number: int = 0, *, keep_all: bool = False) -> None:
+        """Open the link. Raises LinkError, UsageError. `keep_all`: the parsers give every frame, to pass it on."""
         url = parse(config.url)
         self.link: Link = open_link(url)
+        self.number = number
+        """Counts the links of a gateway from 0."""
+        self.robot_status = url.kind != "serial" if config.robot_status is None else config.robot_status
+        """Whether ROBOT_STATUS is sent here if this is a vehicle's link."""
         self.passive = config.passive
         self.is_out = is_out
-        self.listens = url.kind not in SPEAKS_FIRST
-        self.peers: OrderedDict[Address, float] = OrderedDict()
-        """Addresses of autopilots and when they were last heard."""
-        self._parsers: OrderedDict[Address, Parser] = OrderedDict()
+        self.must_speak = url.kind in MUST_SPEAK
+        self.listens = url.kind not in ONE_END
+        """Whether each address that sends is an end of its own; else there is one, whoever answers."""
+        self._wanted = None if keep_all else WANTED_IDS
+        self._channels: OrderedDict[Address, Channel] = OrderedDict()
+        self._source: Address = None
+        if not self.listens:
+            self._only = self._channels[None] = Channel(self, None, Parser(self._wanted))
 
-    def parser(self, source: Address) -> Parser:
-        """The parser of what one address sends."""
-        parser = self._parsers.get(source)
-        if parser is None:
-            if len(self._parsers) < MOST_SOURCES:
-                parser = Parser(WANTED_IDS)
+    def channel(self, source: Address) -> Channel:
+        """The channel of what one address sends."""
+        if not self.listens:
+            if source != self._source:  # another connection: it does not go on where the last one was cut
+                self._source = source
+                self._only.parser.reset()
+            return self._only
+        channel = self._channels.get(source)
+        if channel is None:
+            if len(self._channels) < MOST_SOURCES:
+                parser = Parser(self._wanted)
             else:  # used again: making one costs as much as parsing a hundred frames, which a flood must not cause
-                parser = self._parsers.popitem(last=False)[1]
+                parser = self._channels.popitem(last=False)[1].parser
                 parser.reset()
-            self._parsers[source] = parser
-        elif len(self._parsers) > 1:
-            self._parsers.move_to_end(source)
-        return parser
+            channel = self._channels[source] = Channel(self, source, parser)
+        elif len(self._channels) > 1:
+            self._channels.move_to_end(source)
+        return channel
 
-    def heard_autopilot(self, source: Address, now: float) -> None:
-        """An address that sends an autopilot's heartbeat is a peer, unless there are enough."""
-        if source in self.peers or len(self.peers) < MOST_PEERS:
-            self.peers[source] = now
+    def heard(self, channel: Channel, now: float) -> bool:
+        """A heartbeat of somebody we speak to: an end of a listening link becomes a peer, unless there are enough.
+
+        True if it is a new one.
+        """
+        if channel.heard_at > NEVER or not self.listens:
+            channel.heard_at = now
+            return False
+        if sum(1 for _ in self.peers()) >= MOST_PEERS:
+            return False
+        channel.heard_at = now
+        return True
+
+    def peers(self) -> Iterator[Channel]:
+        """Those who hear what we have to say."""
+        return (c for c in self._channels.values() if c.heard_at > NEVER or not self.listens)
+
+    def channels(self) -> Iterator[Channel]:
+        """Every end that was heard, or to which this link sends."""
+        return iter(self._channels.values())
+
+    def is_peer(self, channel: Channel) -> bool:
+        """Whether we speak to this end, and hence listen to its wishes."""
+        return channel.heard_at > NEVER or not self.listens
 
     def forget_silent(self, now: float) -> None:
-        """Peers that have been silent for long are none any more."""
-        for source in [s for s, at in self.peers.items() if now - at > PEER_SILENCE]:
-            del self.peers[source]
-
-    def send(self, frame: bytes) -> None:
-        """Send to everyone here who listens."""
-        if self.passive:
-            return
-        if not self.listens:
-            self.link.send(frame)
-            return
-        for source in self.peers:
-            self.link.send(frame, source)
-
-    def answer(self, frame: bytes, source: Address) -> None:
-        """Send to one address that was heard here."""
-        if not self.passive:
-            self.link.send(frame, source if self.listens else None)
+        """Peers that have been silent for long are none any more, and what they asked for is over."""
+        for channel in self._channels.values():
+            if now - channel.heard_at > PEER_SILENCE:
+                channel.heard_at, channel.interval = NEVER, None if self.listens else channel.interval
 
     def totals(self) -> Counters:
         """Everything counted on this link."""
         total = Counters()
-        for parser in self._parsers.values():
-            total.add(parser.counters)
+        for channel in self._channels.values():
+            total.add(channel.parser.counters)
         return total

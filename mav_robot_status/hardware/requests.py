@@ -1,5 +1,8 @@
 """Asking an autopilot for the messages that a status needs and that do not come: MAV_CMD_SET_MESSAGE_INTERVAL.
 
+An old ArduPilot that does not know that command is asked for the stream that holds the message, REQUEST_DATA_STREAM;
+only where nothing of that stream comes, since it sets the rate of the whole stream.
+
 A state machine of values and times; it holds no socket. Manners: only what arrives at less than half the wanted rate 3
 s after the first heartbeat is asked for, at most twice, 30 s apart, one command at a time; a rate is never lowered,
 stopped or reset. Sources: MAVLink command protocol; `GCS_MAVLINK::set_message_interval` of ArduPilot; PX4
@@ -23,7 +26,7 @@ log = logging.getLogger(__name__)
 
 SET_MESSAGE_INTERVAL: Final = 511
 REQUEST_MESSAGE: Final = 512
-ACCEPTED, TEMPORARILY_REJECTED, IN_PROGRESS = 0, 1, 5  # MAV_RESULT; every other is final
+ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED, IN_PROGRESS = 0, 1, 3, 5  # MAV_RESULT; what is not named is final
 
 LOOK: Final = 3.0  # s of listening before something counts as missing
 AGAIN: Final = 30.0  # s until the second and last look
@@ -63,6 +66,8 @@ OUTPUT_WATCH: Final = (_wanted(36, 2.0), _wanted(74, 2.0))  # SERVO_OUTPUT_RAW, 
 WATCHED_FAMILIES: Final = frozenset({Family.COPTER, Family.ROVER, Family.PLANE, Family.SUB})
 CURRENT_MODE: Final = (_wanted(436, 1.0),)
 AVAILABLE_MODES: Final = 435
+STREAMS: Final = {1: 2, 36: 3, 33: 6, 32: 6, 30: 10, 74: 11, 2: 12}
+"""The MAV_DATA_STREAM that a message belongs to on ArduPilot (`GCS_MAVLINK_*::data_stream_send` of Copter 3.x)."""
 
 
 def wanted_of(stack: Stack, family: Family, watch_outputs: bool) -> tuple[Wanted, ...]:
@@ -93,6 +98,9 @@ class Requests:
         self._counts: dict[int, int] = {}
         self._queue: deque[_Command] = deque()
         self._refused: set[int] = set()
+        self._silent: set[int] = set()
+        """Messages that did not come at all while it was looked for them."""
+        self._streams: deque[mav.RequestDataStream] = deque()
         self._asked_modes = False
         self._round = 0
         self._window = started
@@ -103,6 +111,7 @@ class Requests:
         self._counts.clear()
         self._queue.clear()
         self._refused.clear()
+        self._streams.clear()
         self._asked_modes = False
         self._round, self._window, self._look_at = 0, now, now + LOOK
 
@@ -131,12 +140,19 @@ class Requests:
             self._queue.popleft()
             if ack.result not in (ACCEPTED, TEMPORARILY_REJECTED):
                 self._refused.add(int(command.params[0]))
+                if ack.result == UNSUPPORTED and command.command == SET_MESSAGE_INTERVAL:
+                    self._fall_back(*command.params)
                 log.debug("%d.%d refused %s: MAV_RESULT %d", *self._ids, command.what, ack.result)
 
-    def due(self, now: float, wanted: tuple[Wanted, ...], ask_modes: bool) -> mav.CommandLong | None:
+    def due(
+        self, now: float, wanted: tuple[Wanted, ...], stack: Stack
+    ) -> mav.CommandLong | mav.RequestDataStream | None:
         """The command to send at `now`, if any; one is outstanding at a time."""
         if now >= self._look_at:
-            self._look(now, wanted, ask_modes)
+            self._look(now, wanted, stack is not Stack.ARDUPILOT)
+        if self._streams:
+            stream = self._streams.popleft()
+            return stream if stack is Stack.ARDUPILOT else None
         while self._queue:
             command = self._queue[0]
             if now < command.due:
@@ -154,6 +170,8 @@ class Requests:
 
     def next_due(self) -> float:
         """When `due` has something to do."""
+        if self._streams:
+            return -math.inf
         return min(self._look_at, self._queue[0].due if self._queue else math.inf)
 
     def _look(self, now: float, wanted: tuple[Wanted, ...], ask_modes: bool) -> None:
@@ -175,11 +193,19 @@ class Requests:
             self._queue.append(_Command(REQUEST_MESSAGE, (AVAILABLE_MODES, 0.0), "AVAILABLE_MODES"))
         if missing:
             log.info("asking vehicle %d.%d for %s", *self._ids, ", ".join(w.name for w in missing))
+        self._silent = {w.id for w in wanted if not self._came(w)}
         self._counts.clear()
         self._window, self._look_at = now + AGAIN - LOOK, now + AGAIN
 
     def _missing(self, wanted: tuple[Wanted, ...]) -> Iterator[Wanted]:
-        for w in wanted:
-            rate = max(self._counts.get(i, 0) for i in (w.id, w.instead) if i is not None) / LOOK
-            if rate < w.rate / 2:
-                yield w
+        return (w for w in wanted if self._came(w) / LOOK < w.rate / 2)
+
+    def _came(self, what: Wanted) -> int:
+        return max(self._counts.get(i, 0) for i in (what.id, what.instead) if i is not None)
+
+    def _fall_back(self, message_id: float, interval_us: float) -> None:
+        """SET_MESSAGE_INTERVAL is not known there: queue the request for the whole stream, if nothing of it comes."""
+        stream = STREAMS.get(int(message_id))
+        if stream is not None and message_id in self._silent:
+            rate = math.ceil(1e6 / interval_us)
+            self._streams.append(mav.RequestDataStream(rate, *self._ids, req_stream_id=stream, start_stop=1))

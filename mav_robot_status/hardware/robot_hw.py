@@ -21,12 +21,12 @@ from ..interface import (
 )
 from ..mavlink import definitions as mav
 from ..mavlink.decode import decode, text
-from . import horizon
+from . import causes, horizon
 from .derive import derive
 from .fields.inhibits import inhibit
 from .fields.view import named
 from .hearing import HANDLERS, hear, overheard, pass_time
-from .identity import Stack, is_autopilot
+from .identity import is_autopilot
 from .memory import begin
 from .observation import SILENCE
 from .options import HardwareOptions
@@ -168,6 +168,14 @@ class MavlinkRobotHW(RobotHW):
         for tracked in self._tracked.values():
             self._evaluate(tracked, now)
 
+    def explained(self, handle: str, now: Instant) -> Tracked | None:
+        """One vehicle by its handle, its evidence brought up to `now`; None if it was not heard."""
+        for tracked in self._tracked.values():
+            if tracked.handle.name == handle:
+                self._evaluate(tracked, now)
+                return tracked
+        return None
+
     def write(self, now: Instant, passive: Container[tuple[int, int]] = ()) -> list[Ask]:
         """What is to be asked of the autopilots at `now`; nothing of those on `passive` links."""
         asks = []
@@ -178,7 +186,7 @@ class MavlinkRobotHW(RobotHW):
             if tracked.requests is None:
                 tracked.requests = Requests(*ids, now.mono)
             wanted = wanted_of(memory.stack, memory.family, self.options.watch_outputs)
-            command = tracked.requests.due(now.mono, wanted, memory.stack is not Stack.ARDUPILOT)
+            command = tracked.requests.due(now.mono, wanted, memory.stack)
             if command is not None:
                 asks.append(Ask(*ids, command))
             elif OUTPUT_WATCH[0] in wanted:
@@ -188,6 +196,14 @@ class MavlinkRobotHW(RobotHW):
                 if request is not None:
                     asks.append(Ask(*ids, request))
         return asks
+
+    def conflict(self, ids: tuple[int, int], now: Instant) -> None:
+        """Two autopilots that claim the ids of this vehicle were heard on different ways."""
+        tracked = self._tracked.get(ids)
+        if tracked is not None and tracked.memory is not None:
+            latches = causes.announce(tracked.memory.latches, 9002, None, now, "clocks of two autopilots")
+            tracked.memory = tracked.memory._replace(latches=latches)
+            tracked.dirty = self.stirred = True
 
     def next_due(self) -> float:
         """When (monotonic seconds) `read` or `write` has something to do, if nothing arrives before."""

@@ -1,7 +1,7 @@
 """The contract that hardware interfaces and controllers share; see `status`, `handle`, `registry`."""
 
 from .handle import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle
-from .publisher import MavlinkPort, Publisher, PublisherContext
+from .publisher import Audience, MavlinkPort, Publisher, PublisherContext
 from .registry import IndustrialRobotStatusInterface, InterfaceManager, RobotHW
 from .status import (
     Detail,
@@ -18,6 +18,7 @@ from .status import (
 
 __all__ = [
     "DEFAULT_HANDLE_NAME",
+    "Audience",
     "Detail",
     "ErrorCause",
     "Evidence",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TextIO
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 
     from ..clock import Instant
     from .status import RobotStatusMsg
@@ -30,10 +30,28 @@ class Publisher(Protocol):
         """The last call: send what is left, let go of what is held."""
 
 
-class MavlinkPort(Protocol):
-    """Where MAVLink goes out: to everyone who listens, under our identity."""
+class Audience(NamedTuple):
+    """Somebody who hears MAVLink from us: an output, or one peer on a link."""
 
-    def send(self, message: Any, system: int) -> None:
+    key: Hashable
+    """Stays the same for as long as the audience is there."""
+    interval: float | None = None
+    """Seconds between two ROBOT_STATUS, as asked for with MAV_CMD_SET_MESSAGE_INTERVAL, whichever vehicle they are
+    about. None: the default. inf: none are wanted."""
+    mirror: bool = False
+    """True if ground stations are there, which may not know ROBOT_STATUS; False towards a vehicle."""
+
+
+class MavlinkPort(Protocol):
+    """Where MAVLink goes out, under our identity."""
+
+    def audiences(self) -> Sequence[Audience]:
+        """Everyone who hears what we say about vehicles, now."""
+
+    def requests(self) -> Collection[tuple[Hashable, int]]:
+        """Who asked, since the last call, for one ROBOT_STATUS: keys of audiences, and system ids of vehicles."""
+
+    def send(self, message: Any, system: int, audience: Audience) -> None:
         """Send a message of `mavlink.definitions` about the vehicle with this system id."""
 
 
@@ -46,3 +64,6 @@ class PublisherContext(NamedTuple):
     stdout: TextIO
     patient: bool = False
     """True on replay: nothing is lost to a slow reader, the log waits instead."""
+    explain: Callable[[str, Instant], Mapping[str, Any] | None] | None = None
+    """Why each field of a handle has its value, as `explain --as-json` tells it; None for an unknown handle, or one
+    whose vehicle was not heard. Only for the gateway's own thread, and not for free: a tenth of a millisecond."""

@@ -15,17 +15,11 @@ __all__ = ["open_link"]
 
 
 def open_link(url: Url) -> Link:
-    """Open a live link. Raises LinkError if it cannot be opened, UsageError if this version cannot open such a link."""
+    """Open a live link. Raises LinkError if it cannot be opened, UsageError for a recorded log."""
     if url.kind == "log":
         raise UsageError(
             f"{url.text!r} is a recorded log, which can only be read; write for example udp:127.0.0.1:14550"
         )
-    opener = BY_NAME[url.kind].opener
-    if opener is None:
-        there_are = ", ".join(kind.name for kind in BY_NAME.values() if kind.opener)
-        raise UsageError(
-            f"{url.text!r}: {url.kind} connections are not available in this version; there are {there_are}"
-        )
-    module, _, name = opener.partition(":")
-    link: Link = getattr(importlib.import_module(module), name)(url)
+    module, _, name = BY_NAME[url.kind].opener.partition(":")
+    link: Link = getattr(importlib.import_module(f"{__name__}.{module}"), name)(url)
     return link

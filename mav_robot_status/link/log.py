@@ -109,10 +109,14 @@ class LogReader:
         """Read the file. Raises UsageError if there is none, it cannot be read, or it is empty."""
         self.path = path
         self._log = _read(path)
+        self.size = len(self._log)
+        self.given = 0
+        """Bytes of the log that were handed on."""
 
     def blocks(self) -> Iterator[bytes]:
         """The whole log in order."""
-        for start in range(0, len(self._log), BLOCK):
+        for start in range(0, self.size, BLOCK):
+            self.given = min(start + BLOCK, self.size)
             yield self._log[start : start + BLOCK]
 
 

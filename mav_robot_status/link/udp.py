@@ -1,37 +1,51 @@
-"""UDP links: listening on a port, or sending to one. IPv4 and IPv6."""
+"""UDP links: listening on a port, sending to one, broadcasting until somebody answers. IPv4 and IPv6."""
 
 from __future__ import annotations
 
 import errno
-import glob
+import logging
+import math
 import os
+import random
 import socket
 import struct
-import threading
 from contextlib import suppress
 from typing import Any
 
 from mav_robot_status.errors import LinkError
 from mav_robot_status.link.base import Address, Received
-from mav_robot_status.link.url import Url
+from mav_robot_status.link.listen import Place
+from mav_robot_status.link.resolve import ASK_AGAIN, Lookup, Target
+from mav_robot_status.link.retry import Backoff, Chance, Changes
+from mav_robot_status.link.url import Url, host_port
+
+log = logging.getLogger(__name__)
 
 RECEIVE_BUFFER = 4 << 20
 """Bytes that the kernel is asked to hold for us: seconds of traffic while the process is not scheduled."""
-RESOLVE_EVERY = 5.0
-"""Seconds between two attempts to resolve the name of a peer."""
 RESOLVE_WAIT = 0.2
-"""Seconds that opening waits for the first attempt, so that a name that is known is there for the first send."""
+"""Seconds that opening waits for a name, so that one that is known is there for the first send."""
+RETRY = 0.2, 5.0
+"""Seconds between attempts to resolve a name or to bind to an address that is not there: the first, the longest."""
+ANSWER_SILENCE = 30.0
+"""Seconds without a datagram of the peer that answered, after which it is looked for by broadcasting again."""
 
 _LARGEST = 65535
 _SO_RCVBUFFORCE = 33  # Linux; Python does not name these
 _SO_MEMINFO = 55
 _MEMINFO = struct.Struct("9I")  # the last word counts what the kernel dropped
 
-_Info = tuple[int, tuple[Any, ...]]  # address family, socket address
+_UNREACHABLE = dict.fromkeys((errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN, errno.ENODEV, errno.EPERM), "")
+"""Errors of sending that last until somebody does something, with words that say more than the system's. Others, such
+as a full buffer, are of one datagram."""
+_UNREACHABLE[errno.EACCES] = "that is a broadcast address, for which write udpbcast:"
+_MOST_UNREACHABLE = 16
+
+SocketAddress = tuple[Any, ...]
 
 
 class UdpLink:
-    """A UDP socket as a `Link`: kind `udpin` listens, kind `udpout` sends to one peer and hears whoever answers.
+    """A UDP socket as a `Link`; what the kinds have in common.
 
     The kernel's drop counter is read when a `receive` reached its limit, and only then: a queue that overflowed is
     longer than that. It costs nothing at ordinary rates; SO_RXQ_OVFL needs recvmsg, a third more for every datagram.
@@ -39,26 +53,16 @@ class UdpLink:
 
     stream = False
 
-    def __init__(self, url: Url) -> None:
-        """Open it. Raises LinkError if the port is taken or not allowed, or the address is not this machine's.
-
-        A peer whose name does not resolve yet is no error: it is asked for again every RESOLVE_EVERY seconds, by a
-        thread because resolving can block. Until then `fileno` is -1 and what is sent counts as dropped.
-        """
+    def __init__(self, url: Url, chance: Chance = random.random) -> None:
         self.text = url.words()
         self.dropped = 0
         self._kernel_dropped = 0
         self._socket: socket.socket | None = None
-        self._peer: tuple[Any, ...] | None = None
-        self._resolved: _Info | None = None
-        self._closed = threading.Event()
-        if url.kind == "udpin":
-            self._socket = _listen(url)
-            port = int(self._socket.getsockname()[1])
-            self.text = url._replace(port=port).words()
-        else:
-            self._start_resolving(url)
-            self._connect()
+        self._peer: SocketAddress | None = None
+        self._unreachable: dict[SocketAddress, str] = {}
+        self._due = math.inf
+        self._backoff = Backoff(*RETRY, chance)
+        self._changes = Changes(log)
 
     def fileno(self) -> int:
         """The socket's descriptor; -1 once closed, and before the peer's name is resolved."""
@@ -84,25 +88,38 @@ class UdpLink:
         return pieces
 
     def send(self, data: bytes, to: Address = None) -> bool:
-        """Send to `to`, a source that `receive` gave, or to the peer. False if it was not sent.
-
-        Raises LinkError if a name resolved to a kind of address that this machine cannot use.
-        """
-        if self._socket is None:
-            self._connect()
+        """Send to `to`, a source that `receive` gave, or to the peer. False if it was not sent."""
         target = to if isinstance(to, tuple) else self._peer
         if self._socket is not None and target is not None:
-            with suppress(OSError):  # full, refused, unreachable, too long: a datagram is lost, the link is not
+            try:
                 self._socket.sendto(data, target)
+            except OSError as error:  # full, refused, unreachable, too long: a datagram is lost, the link is not
+                self._tell_unreachable(target, error)
+            else:
+                if self._unreachable:
+                    self._tell_reachable(target)
                 return True
         self.dropped += 1
         return False
 
+    def due(self) -> float:
+        """When `service` has something to do."""
+        return self._due
+
+    def service(self, now: float) -> None:
+        """Do what is due at `now`."""
+        if now >= self._due:
+            self._due = math.inf
+            self._serve(now)
+
     def close(self) -> None:
-        """Close the socket and stop asking for the peer's name."""
-        self._closed.set()
+        """Close the socket."""
+        self._due = math.inf
         if self._socket:
             self._socket.close()
+
+    def _serve(self, now: float) -> None:
+        """What this kind does when its time has come."""
 
     def _count_kernel_drops(self) -> None:
         with suppress(OSError, struct.error):  # a kernel that does not tell
@@ -111,36 +128,114 @@ class UdpLink:
             self.dropped += (total - self._kernel_dropped) & 0xFFFFFFFF
             self._kernel_dropped = total
 
-    def _start_resolving(self, url: Url) -> None:
-        """A numeric address at once, a name in a thread of its own."""
+    def _tell_unreachable(self, target: SocketAddress, error: OSError) -> None:
+        """Say once that a target cannot be reached. Bounded: there may be as many targets as there are addresses."""
+        if error.errno in _UNREACHABLE:
+            why = _UNREACHABLE[error.errno] or os.strerror(error.errno).lower()
+            if self._unreachable.get(target) != why and len(self._unreachable) < _MOST_UNREACHABLE:
+                self._unreachable[target] = why
+                log.warning("%s: cannot send to %s: %s", self.text, host_port(*target[:2]), why)
+
+    def _tell_reachable(self, target: SocketAddress) -> None:
+        if self._unreachable.pop(target, None):
+            log.info("%s: can send to %s again", self.text, host_port(*target[:2]))
+
+
+class UdpListener(UdpLink):
+    """Kind `udpin`: has a port for itself, by neither SO_REUSEADDR nor SO_REUSEPORT.
+
+    An address that this machine does not have is waited for.
+    """
+
+    def __init__(self, url: Url, chance: Chance = random.random) -> None:
+        """Open it. Raises LinkError if the port is taken or not allowed, or the host is not known."""
+        super().__init__(url, chance)
+        self._place = Place(url, _new_socket, socket.SOCK_DGRAM, self._changes)
+        self._socket = self._place.take()
+        self.text = self._place.text
+        self._due = math.inf if self._socket else -math.inf
+
+    def _serve(self, now: float) -> None:
+        self._socket = self._place.take_late()
+        self.text = self._place.text
+        self._due = math.inf if self._socket else self._backoff.after(now)
+
+
+class UdpSender(UdpLink):
+    """Kind `udpout`: sends to one peer and hears whoever answers.
+
+    A peer whose name does not resolve yet is no error; until it does, what is sent counts as dropped.
+    """
+
+    def __init__(self, url: Url, chance: Chance = random.random) -> None:
+        """Open it. Raises LinkError for a kind of address that this machine cannot use."""
+        super().__init__(url, chance)
+        self._host = url.host
+        self._lookup = Lookup(url.host, url.port, socket.SOCK_DGRAM)
+        found = self._lookup.ask(RESOLVE_WAIT)
+        if found:
+            self._open(found[0])
+        else:
+            self._due = -math.inf
+
+    def _open(self, target: Target) -> None:
+        """Make the socket. It stays unconnected: an answer may come from another address."""
         try:
-            self._resolved = _resolve(url, socket.AI_NUMERICHOST)
-        except (OSError, ValueError):
-            thread = threading.Thread(target=self._keep_resolving, args=(url,), name=f"resolve {url.host}", daemon=True)
-            thread.start()
-            thread.join(RESOLVE_WAIT)
+            self._socket = _new_socket(target[0])
+        except OSError as error:
+            raise LinkError(f"{self.text}: {error.strerror}") from None
+        self._peer = target[1]
+        self._changes.good_again(f"{self.text}: {self._host} is {self._peer[0]}")
 
-    def _keep_resolving(self, url: Url) -> None:
-        while not self._closed.is_set():
-            with suppress(OSError, ValueError):
-                self._resolved = _resolve(url)
+    def _serve(self, now: float) -> None:
+        found = self._lookup.ask()
+        if found is None:
+            self._due = now + ASK_AGAIN
+            return
+        try:
+            if found:
+                self._open(found[0])
                 return
-            self._closed.wait(RESOLVE_EVERY)
-
-    def _connect(self) -> None:
-        """Make the socket once the address is known. It stays unconnected: an answer may come from another address."""
-        if self._resolved is not None and not self._closed.is_set():
-            family, self._peer = self._resolved
-            try:
-                self._socket = _new_socket(family)
-            except OSError as error:
-                raise LinkError(f"{self.text}: {error.strerror}") from None
+            self._changes.bad(f"{self.text}: the name {self._host} is not known yet, asking again")
+        except LinkError as problem:
+            self._changes.bad(str(problem))
+        self._due = self._backoff.after(now)
 
 
-def _resolve(url: Url, flags: int = 0) -> _Info:
-    """The first address of the host. Raises OSError (unknown) or ValueError (no possible name)."""
-    family, _, _, _, address = socket.getaddrinfo(url.host, url.port, type=socket.SOCK_DGRAM, flags=flags)[0]
-    return family, address
+class UdpBroadcaster(UdpSender):
+    """Kind `udpbcast`: sends to everybody until somebody answers, then to that peer, until it is silent for long."""
+
+    _everybody: SocketAddress | None = None
+    _heard = False
+
+    def receive(self, limit: int = 64) -> list[Received]:
+        """The datagrams that are waiting; the first that answers becomes the peer."""
+        pieces = super().receive(limit)
+        if pieces and self._peer == self._everybody:
+            peer: Any = pieces[0].source
+            self._peer = peer
+            self._changes.good(f"{self.text}: {host_port(*peer[:2])} answers, sending to it")
+        if any(piece.source == self._peer for piece in pieces):
+            self._heard = True
+            self._due = -math.inf
+        return pieces
+
+    def _open(self, target: Target) -> None:
+        super()._open(target)
+        assert self._socket is not None
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._everybody = self._peer
+
+    def _serve(self, now: float) -> None:
+        if self._socket is None:
+            super()._serve(now)
+        elif self._heard:
+            self._heard = False
+            self._due = now + ANSWER_SILENCE
+        else:
+            assert self._peer is not None
+            self._changes.bad(f"{self.text}: {host_port(*self._peer[:2])} is silent, broadcasting again")
+            self._peer = self._everybody
 
 
 def _new_socket(family: int) -> socket.socket:
@@ -152,50 +247,3 @@ def _new_socket(family: int) -> socket.socket:
     except OSError:
         new.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
     return new
-
-
-def _listen(url: Url) -> socket.socket:
-    """A socket bound to the port, for us alone: neither SO_REUSEADDR nor SO_REUSEPORT."""
-    where = f"udp port {url.port} on {url.host}"
-    try:
-        family, address = _resolve(url, socket.AI_PASSIVE)
-    except (OSError, ValueError):
-        raise LinkError(f"{url.host!r} is not a known host; to listen write an address of this machine") from None
-    new = _new_socket(family)
-    try:
-        new.bind(address)
-    except OSError as error:
-        new.close()
-        raise LinkError(_why_not(error, where, url.port)) from None
-    return new
-
-
-def _why_not(error: OSError, where: str, port: int) -> str:
-    """One line for a person whose port could not be had."""
-    if error.errno == errno.EADDRINUSE:
-        return f"{where} is taken by {port_owner(port) or 'another program'}; stop it or listen on another port"
-    if error.errno == errno.EACCES:
-        return f"{where}: no permission; ports below 1024 are the system's, listen on another one"
-    if error.errno == errno.EADDRNOTAVAIL:
-        return f"{where}: this machine has no such address; listen on one of its own, or on 0.0.0.0 for all"
-    return f"{where}: {error.strerror}"
-
-
-def port_owner(port: int) -> str:
-    """Who holds a UDP port, `mavproxy.py (pid 1234)`, as far as /proc tells this user; else empty. Never raises."""
-    sockets = {f"socket:[{inode}]" for table in ("/proc/net/udp", "/proc/net/udp6") for inode in _inodes(table, port)}
-    for link in glob.iglob("/proc/[0-9]*/fd/*") if sockets else ():
-        with suppress(OSError):  # gone meanwhile, or another user's
-            if os.readlink(link) in sockets:
-                pid = link.split("/")[2]
-                with open(f"/proc/{pid}/comm", encoding="utf-8", errors="replace") as comm:
-                    return f"{comm.read().strip()} (pid {pid})"
-    return ""
-
-
-def _inodes(table: str, port: int) -> list[str]:
-    """The inodes of the sockets bound to a port, in a table of /proc/net: `sl address:PORT ... inode`."""
-    with suppress(OSError, IndexError), open(table, encoding="ascii", errors="replace") as lines:
-        rows = [line.split() for line in lines][1:]
-        return [row[9] for row in rows if row[1].endswith(f":{port:04X}")]
-    return []

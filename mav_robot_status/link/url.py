@@ -28,29 +28,30 @@ class Kind(NamedTuple):
     """What is done, for the log; filled with `where` (HOST:PORT), `device` and `baud`."""
     example: str
     description: str
-    opener: str | None
-    """`module:callable`, from a `Url` to a `Link` (log: from a path to a reader); None: not in this version."""
+    opener: str
+    """`module:callable` in this package, from a `Url` to a `Link` (log: from a path to a reader)."""
 
 
 KINDS = (
     Kind("udpin", ("udp", "udpin"), "udp:H:P  udpin:H:P  udp://[H]:P  udpin://H:P", "listening on {where}/udp",
-         "udp:127.0.0.1:14550", "listen on a UDP port", "mav_robot_status.link.udp:UdpLink"),
+         "udp:127.0.0.1:14550", "listen on a UDP port", "udp:UdpListener"),
     Kind("udpout", ("udpout",), "H:P  udpout:H:P  udpout://H:P", "sending to {where}/udp",
-         "udpout:192.168.1.20:14550", "send to a UDP port", "mav_robot_status.link.udp:UdpLink"),
+         "udpout:192.168.1.20:14550", "send to a UDP port", "udp:UdpSender"),
     Kind("udpbcast", ("udpbcast",), "udpbcast:H:P", "broadcasting to {where}/udp",
-         "udpbcast:192.168.1.255:14550", "broadcast on UDP until a peer answers", None),
+         "udpbcast:192.168.1.255:14550", "broadcast on UDP until a peer answers", "udp:UdpBroadcaster"),
     Kind("tcp", ("tcp", "tcpout"), "tcp:H:P  tcpout://H:P", "connecting to {where}/tcp",
-         "tcp:127.0.0.1:5760", "connect to a TCP server", None),
+         "tcp:127.0.0.1:5760", "connect to a TCP server", "tcp:TcpLink"),
     Kind("tcpin", ("tcpin",), "tcpin:H:P  tcpin://H:P", "listening on {where}/tcp",
-         "tcpin:0.0.0.0:5760", "be a TCP server", None),
+         "tcpin:0.0.0.0:5760", "be a TCP server", "tcp_server:TcpServerLink"),
     Kind("serial", ("serial",), "/dev/ttyX[,BAUD]  /dev/ttyX:BAUD  serial:///dev/ttyX:BAUD",
          "serial {device} at {baud} baud", "/dev/ttyACM0,57600",
-         f"a serial device; {DEFAULT_BAUD} baud unless told", None),
+         f"a serial device; {DEFAULT_BAUD} baud unless told", "serial:SerialLink"),
     Kind("log", (), "FILE", "recorded log {device}",
-         "flight.tlog", "replay a recorded log", "mav_robot_status.link.log:LogReader"),
+         "flight.tlog", "replay a recorded log", "log:LogReader"),
 )  # fmt: skip
 """Every kind, in the order in which the help shows them."""
 
+LISTENERS = ("udpin", "tcpin")
 BY_NAME = {kind.name: kind for kind in KINDS}
 _BY_SCHEME = {scheme: kind for kind in KINDS for scheme in kind.schemes}
 _SOME = ", ".join(BY_NAME[name].example for name in ("udpin", "serial", "log"))
@@ -81,14 +82,21 @@ class Url(NamedTuple):
 
     def words(self) -> str:
         """What will be done, in words: `listening on 127.0.0.1:14550/udp`."""
-        where = f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
-        return BY_NAME[self.kind].words.format(where=where, device=self.device, baud=self.baud)
+        return BY_NAME[self.kind].words.format(where=self.where(), device=self.device, baud=self.baud)
+
+    def where(self) -> str:
+        """HOST:PORT, as `host_port` writes it."""
+        return host_port(self.host, self.port)
+
+
+def host_port(host: str, port: int) -> str:
+    """`127.0.0.1:14550`, `[::1]:14550`."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def help_text() -> str:
-    """The forms that a CONNECTION takes, one kind a line and its forms below it; only what this version can open."""
-    there_are = [kind for kind in KINDS if kind.opener]
-    return "\n".join(f"  {kind.example:<30}{kind.description}\n  {'':<30}{kind.forms}" for kind in there_are)
+    """The forms that a CONNECTION takes, one kind a line and its forms below it."""
+    return "\n".join(f"  {kind.example:<30}{kind.description}\n  {'':<30}{kind.forms}" for kind in KINDS)
 
 
 def parse(text: str, baud: int | None = None) -> Url:
@@ -125,14 +133,13 @@ def _network(text: str, kind: Kind, rest: str) -> Url:
     if "@" in rest:
         _explain_mavros(text, kind, rest)
     found = _HOST_PORT.fullmatch(rest.rstrip("/"))
-    listens = kind.name in ("udpin", "tcpin")
     if found is None:
         if rest.count(":") > 1 and "[" not in rest:
             raise UsageError(f"{text!r}: write an IPv6 address in brackets, {kind.schemes[0]}:[::1]:14550")
         problem = "has no port" if _ADDRESS.fullmatch(rest) or not rest else "is not HOST:PORT"
         raise UsageError(f"{text!r} {problem}; write for example {_with_port(kind, rest)}")
     host, port = found[1] or found[2], found[3]
-    if not host and not listens:
+    if not host and kind.name not in LISTENERS:
         raise UsageError(f"{text!r} has no host; write for example {kind.example}")
     if not port:
         raise UsageError(f"{text!r} has no port; write for example {_with_port(kind, host)}")
@@ -146,9 +153,9 @@ def _with_port(kind: Kind, host: str) -> str:
 
 
 def _port(text: str, kind: Kind, digits: str) -> int:
-    """1-65535. Port 0 (whatever is free) is for a UDP listener only, and for tests: nobody could know where to send."""
+    """1-65535. Port 0 (whatever is free) is for listeners only, and for tests: nobody could know where to send."""
     port = int(digits[:6])
-    if not (0 < port <= 65535 or (port == 0 and kind.name == "udpin")):
+    if not (0 < port <= 65535 or (port == 0 and kind.name in LISTENERS)):
         raise UsageError(f"{text!r}: a port is 1 to 65535, not {digits[:12]}; write for example {kind.example}")
     return port
 

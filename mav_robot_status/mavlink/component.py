@@ -25,8 +25,8 @@ LONELY_SYSTEM: Final = 245
 ONBOARD_CONTROLLER, INVALID = 18, 8  # MAV_TYPE, MAV_AUTOPILOT
 ACTIVE, CRITICAL = 4, 5  # MAV_STATE
 MAVLINK_VERSION: Final = 3
-REMEMBERED: Final = 8
-"""Heartbeats of ours, for each system, that are known again if a router sends them back."""
+REMEMBERED: Final = 64
+"""Heartbeats of ours, for each system, that are known again if a router sends them back: of several channels."""
 
 
 class Component:
@@ -39,21 +39,31 @@ class Component:
         self._others: set[tuple[int, int]] = set()
         """Systems and components of `_ids` that other programs speak as: at most 255 times 5."""
         self._encoders: dict[int, Encoder] = {}
+        self._systems: set[int] = set()
+        """Systems that we speak for."""
         self._sent: dict[int, deque[tuple[int, int, bytes]]] = {}
 
     def system_for(self, vehicle: int) -> int:
         """Our system id when we speak about this vehicle."""
         return vehicle if self._system is None else self._system
 
-    def frame(self, message: Any, vehicle: int) -> bytes:
-        """The next frame with `message` about the vehicle with this system id."""
+    def speaks_as(self, system: int, component: int) -> bool:
+        """Whether these are ids that we have spoken under."""
+        return component == self.id and system in self._systems
+
+    def frame(self, message: Any, vehicle: int, encoders: dict[int, Encoder] | None = None) -> bytes:
+        """The next frame with `message` about the vehicle with this system id.
+
+        `encoders` are those of the channel that it goes to, each channel counting for itself; None: there is just one.
+        """
         system = self.system_for(vehicle)
-        encoder = self._encoders.get(system)
-        if encoder is None:
-            encoder = self._encoders[system] = Encoder(system, self.id)
+        if system not in self._systems:
+            self._systems.add(system)
             self._step_aside(system)
-        if encoder.component != self.id:
-            encoder = self._encoders[system] = Encoder(system, self.id)
+        encoders = self._encoders if encoders is None else encoders
+        encoder = encoders.get(system)
+        if encoder is None or encoder.component != self.id:
+            encoder = encoders[system] = Encoder(system, self.id)
         sequence = encoder.sequence
         frame = encoder.frame(message)
         if type(message) is Heartbeat:
@@ -61,10 +71,10 @@ class Component:
             sent.append((self.id, sequence, frame[10:-2]))
         return frame
 
-    def heartbeat(self, vehicle: int, in_error: bool = False) -> bytes:
+    def heartbeat(self, vehicle: int, in_error: bool = False, encoders: dict[int, Encoder] | None = None) -> bytes:
         """Our HEARTBEAT; its state mirrors the vehicle's in_error."""
         state = CRITICAL if in_error else ACTIVE
-        return self.frame(Heartbeat(0, ONBOARD_CONTROLLER, INVALID, 0, state, MAVLINK_VERSION), vehicle)
+        return self.frame(Heartbeat(0, ONBOARD_CONTROLLER, INVALID, 0, state, MAVLINK_VERSION), vehicle, encoders)
 
     def heard(self, frame: Frame) -> None:
         """Look at a HEARTBEAT: if another program speaks as we do, or as we could, keep out of its way."""
@@ -78,9 +88,9 @@ class Component:
 
     def _step_aside(self, system: int) -> None:
         """Take another component if ours is taken in a system that we speak for. Each is left only once."""
-        if system not in self._encoders or (system, self.id) not in self._others:
+        if system not in self._systems or (system, self.id) not in self._others:
             return
-        taken = {component for s, component in self._others if s in self._encoders}
+        taken = {component for s, component in self._others if s in self._systems}
         free = next((c for c in self._ids if c not in taken), None)
         if free is None:
             log.warning("other programs speak as %s in system %d: staying %d", self._ids, system, self.id)

@@ -14,6 +14,32 @@ from ..errors import LinkError
 NAME: Final = "mav_robot_status"
 INCLUDED: Final = ("common", "standard", "minimal")
 
+ANY_PORT: Final = """
+-- any other UDP port: a datagram that is whole MAVLink frames and nothing else
+
+local function only_frames(buffer)
+    local offset = 0
+    while offset + 8 <= buffer:len() do
+        local magic, length = buffer(offset, 1):uint(), buffer(offset + 1, 1):uint()
+        if magic == 0xfd then
+            offset = offset + 12 + length + 13 * (buffer(offset + 2, 1):uint() % 2) -- the last term: a signature
+        elseif magic == 0xfe then
+            offset = offset + 8 + length
+        else
+            return false
+        end
+    end
+    return offset > 0 and offset == buffer:len()
+end
+
+mavlink_proto:register_heuristic("udp", function(buffer, pinfo, tree)
+    if not only_frames(buffer) then return false end
+    mavlink_proto.dissector(buffer, pinfo, tree)
+    return true
+end)
+"""
+"""Lua: the generated dissector knows three UDP ports, and a vehicle or an `--out` may use any."""
+
 
 def xml_path() -> Path:
     """Where our XML is: in the installed package, or beside it in a checkout."""
@@ -39,7 +65,9 @@ def write_files(folder: str) -> list[Path]:
             options = mavgen.Opts(str(Path(work) / f"{NAME}.lua"), wire_protocol="2.0", language="WLua", validate=False)
             with contextlib.redirect_stderr(io.StringIO()):
                 mavgen.mavgen(options, [str(source)])
-            written.append(Path(shutil.copyfile(Path(work) / f"{NAME}.lua", target / f"{NAME}.lua")))
+            lua = target / f"{NAME}.lua"
+            lua.write_text((Path(work) / f"{NAME}.lua").read_text("utf-8") + ANY_PORT, "utf-8")
+            written.append(lua)
     except OSError as error:
         raise LinkError(f"cannot write to {folder}: {error.strerror}") from None
     return written

@@ -43,6 +43,11 @@ def encode(message: NamedTuple, *, system: int, component: int, sequence: int, v
     except (struct.error, OverflowError, TypeError) as error:
         where = f"system {system}, component {component}, sequence {sequence}, MAVLink {version}"
         raise ValueError(f"{message} ({where}) does not fit its frame: {error}") from None
+    return with_crc(frame, crc_extra)
+
+
+def with_crc(frame: bytes, crc_extra: bytes) -> bytes:
+    """A frame that ends with its payload, completed; `crc_extra` is one byte, its bits mirrored."""
     crc = crc_hqx(crc_extra, crc_hqx(frame[1:].translate(MIRROR), 0xFFFF))
     return frame + CHECKSUM(crc).translate(MIRROR)
 

@@ -1,25 +1,21 @@
 """Statuses as MAVLink: ROBOT_STATUS (id 59900) to everyone who listens.
 
 It thins itself, whatever the controller's rate: 1 Hz, and changes at most 5 a second with the last state always sent.
+An audience may ask for another interval than a second, or for none; it never gets more than the controller publishes.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from ..interface import LinkState
+from ..mavlink.commands import PERIODS, ROBOT_STATUS
 from ..mavlink.definitions import RobotStatus as RobotStatusMessage
+from .thinning import Schedule, ThinnedPublisher
 
 if TYPE_CHECKING:
     from ..clock import Instant
-    from ..interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg
-
-INTERVAL: Final = 1.0  # s
-MOST_CHANGES: Final = 5
-WINDOW: Final = 1.0  # s
-SLACK: Final = 1e-3  # s: a message that comes this much early still counts as periodic
+    from ..interface import Audience, RobotStatusMsg
 
 
 def message_of(msg: RobotStatusMsg) -> RobotStatusMessage:
@@ -43,61 +39,37 @@ def message_of(msg: RobotStatusMsg) -> RobotStatusMessage:
     )
 
 
-class _Subject:
-    """What was sent about one handle."""
+class MavlinkPublisher(ThinnedPublisher[Schedule]):
+    """Sends ROBOT_STATUS."""
 
-    __slots__ = ("changes", "last", "sent", "waiting")
+    name = "mavlink"
+    memory = Schedule
 
-    def __init__(self) -> None:
-        self.last = -math.inf
-        self.sent: tuple[RobotStatus, Detail] | None = None
-        self.changes: deque[float] = deque(maxlen=MOST_CHANGES)
-        self.waiting: RobotStatusMsg | None = None
-
-
-class MavlinkPublisher:
-    """Sends ROBOT_STATUS. About a vehicle that was never heard nothing is said."""
-
-    periodic = True
-
-    def __init__(self, context: PublisherContext) -> None:
-        self._port = context.mavlink
-        self._subjects: dict[str, _Subject] = {}
-
-    def busy(self) -> bool:
-        """Never: what is too much is held back, and only its last state is kept."""
-        return False
-
-    def publish(self, msg: RobotStatusMsg) -> None:
-        """Hold the message; `service`, called after every round of updates, sends it if it is its turn."""
-        self._subjects.setdefault(msg.handle, _Subject()).waiting = msg
+    def wants(self, audience: Audience) -> bool:
+        """True unless the audience wants none."""
+        return audience.interval != math.inf
 
     def service(self, now: Instant) -> float | None:
-        """Send what is its turn; when a change that is held back will be."""
-        again = math.inf
-        for subject in self._subjects.values():
-            msg = subject.waiting
-            if msg is None or msg.detail.system is None or msg.detail.link is LinkState.NEVER_SEEN:
-                continue
-            content = (msg.status, msg.detail)
-            periodic = now.mono - subject.last >= INTERVAL - SLACK
-            changed = content != subject.sent
-            if not periodic and not changed:
-                subject.waiting = None
-                continue
-            full = len(subject.changes) == MOST_CHANGES and now.mono - subject.changes[0] < WINDOW
-            if not periodic and full:
-                again = min(again, subject.changes[0] + WINDOW, subject.last + INTERVAL)
-                continue
-            if not periodic:
-                subject.changes.append(now.mono)
-            else:
-                # the phase is kept, or jitter would add up and thin 1 Hz further
-                late = now.mono - subject.last >= 2 * INTERVAL
-                subject.last = now.mono if late else subject.last + INTERVAL
-            subject.sent, subject.waiting = content, None
-            self._port.send(message_of(msg), msg.detail.system)
-        return None if again == math.inf else again
+        """Send what is its turn, and what was asked for once; when a change that is held back will be due."""
+        again = super().service(now)
+        requests = self._port.requests()
+        if requests:
+            audiences = {audience.key: audience for audience in self._port.audiences()}
+            for key, system in requests:
+                if key in audiences:
+                    self._send_once(audiences[key], system)
+        return again
 
-    def close(self) -> None:
-        """Nothing is held."""
+    def tell(self, msg: RobotStatusMsg, system: int, audience: Audience, told: Schedule, now: float) -> float:
+        """Send the status if it is its turn."""
+        interval = PERIODS[ROBOT_STATUS] if audience.interval is None else audience.interval
+        due = told.turn(msg, (msg.status, msg.detail), interval, now)
+        if due > now:
+            return due
+        self._port.send(message_of(msg), system, audience)
+        return math.inf
+
+    def _send_once(self, audience: Audience, system: int) -> None:
+        for msg in self._latest.values():
+            if msg.detail.system == system:
+                self._port.send(message_of(msg), system, audience)

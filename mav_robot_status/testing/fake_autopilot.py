@@ -25,6 +25,8 @@ RECEIVED_KEPT = 1000
 """How many received messages are remembered."""
 READ_AT_ONCE = 100
 """Datagrams read per poll: a flood must not keep the vehicle from sending."""
+SIGNING_EPOCH = 1_420_070_400
+"""2015-01-01: a signature's time stamp counts 10 us from there."""
 PATIENCE = 0.02
 """Seconds that the thread waits for a datagram before it looks what is due."""
 
@@ -42,7 +44,7 @@ class FakeAutopilot:
     let a thread run with the real clock: `with FakeAutopilot(scenario, to=...) as ap:`. Everything that changes the
     vehicle (`arm`, `say`, ...) may be called from any thread and happens at the next poll. `speed` makes the scenario's
     steps pass faster, `loop` starts it anew at its end, `on_note` is called with each step that happens (from the
-    thread, if there is one); by default it is logged.
+    thread, if there is one); by default it is logged. With a `signing_key` of 32 bytes what it sends is signed.
 
     Raises OSError if `bind` is taken.
     """
@@ -58,6 +60,7 @@ class FakeAutopilot:
         loop: bool = False,
         on_note: Callable[[Step], None] = _log_note,
         bind: Address = ("127.0.0.1", 0),
+        signing_key: bytes | None = None,
     ) -> None:
         self.scenario = scenario
         self._model: VehicleModel | None = None
@@ -65,6 +68,10 @@ class FakeAutopilot:
         self._to = to
         self._answers_sender = to is None
         self._mav = MAVLink(None, srcSystem=system, srcComponent=component)
+        if signing_key is not None:
+            self._mav.signing.secret_key = signing_key
+            self._mav.signing.sign_outgoing = True
+            self._mav.signing.timestamp = int((clock.now().unix_us / 1e6 - SIGNING_EPOCH) * 1e5)
         self._asked: deque[Step] = deque()
         self._received: deque[Any] = deque(maxlen=RECEIVED_KEPT)
         self._lock = threading.Lock()

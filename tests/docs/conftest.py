@@ -42,5 +42,6 @@ def place(tmp_path: pathlib.Path, flight_log: pathlib.Path, monkeypatch: pytest.
     shutil.copy(flight_log, tmp_path)
     shutil.copytree(ROOT / "config", tmp_path / "config")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("PATH", str(pathlib.Path(sys.executable).parent), prepend=os.pathsep)
     return tmp_path

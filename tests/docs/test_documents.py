@@ -19,7 +19,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import datetime, timedelta, timezone
 from typing import Any
 
@@ -38,6 +38,7 @@ from mav_robot_status.interface import (
 )
 from mav_robot_status.publishers import json_lines
 
+from ..system.bridges import PtyBridge
 from .documents import DOCUMENTS, ROOT, Block, blocks, links, prose
 
 SCHEMA = ROOT / "mav_robot_status" / "data" / "robot_status.schema.json"
@@ -46,6 +47,8 @@ TESTS = SETUP + "-e '.[dev]' && .venv/bin/python -m pytest"
 DEMO = SETUP + ". && .venv/bin/mav-robot-status demo"
 GENERATORS = {".venv/bin/python dialects/generate.py": ".", ".venv/bin/python docs/make_reference.py": "reference.md"}
 """And what they write to, in the folder of the test."""
+BENCH = ".venv/bin/python -m bench"
+KEY = bytes(range(32))
 PATIENCE = 30.0  # s until a command counts as hanging
 
 COMMANDS = [(block, line) for block in blocks("bash") for line in block.code.splitlines() if line.strip()]
@@ -137,9 +140,12 @@ def test_a_command_does_what_it_says(block: Block, command: str, place: pathlib.
         _runs_until_stopped(place, ["mav-robot-status", "demo"], signal.SIGINT)
     elif (target := GENERATORS.get(command)) is not None:
         subprocess.run([sys.executable, ROOT / command.split()[1], place / target], check=True, timeout=PATIENCE)
+    elif command.startswith(BENCH):  # measuring takes minutes: here it only says what it would measure
+        bench = [sys.executable, *command.split()[1:], "--list"]
+        assert subprocess.run(bench, cwd=ROOT, capture_output=True, check=True, timeout=PATIENCE).stdout
     elif command.startswith(".venv/bin/"):
         assert command in _ci()
-    elif command.startswith("mav-robot-status ") and re.search(r" udp:| --config ", command):
+    elif command.startswith("mav-robot-status ") and re.search(r" udp:| /dev/tty| --config ", command):
         _runs_until_stopped(place, _with_free_ports(place, command).split(), signal.SIGTERM)
     elif command.startswith("mav-robot-status "):
         before = {path.name for path in place.iterdir()}
@@ -242,24 +248,47 @@ def _running(command: list[str]) -> Iterator[subprocess.Popen[str]]:
             process.kill()
         assert process.returncode == 0, log
         assert "Traceback" not in log
-        assert "listening on" in log
+        assert "listening on" in log or "serial" in log
 
 
 def _runs_until_stopped(place: pathlib.Path, command: list[str], stop: signal.Signals) -> None:
+    command = _with_our_key(place, _with_our_devices(place, command))
     with _vehicle(command, testing.ardurover.READY), _running(command) as process:
         assert process.stdout is not None
         assert json.loads(process.stdout.readline())["seq"] == 0
         process.send_signal(stop)
 
 
+def _with_our_devices(place: pathlib.Path, command: list[str]) -> list[str]:
+    return [part.replace("/dev/", f"{place}/") if part.startswith("/dev/tty") else part for part in command]
+
+
+def _with_our_key(place: pathlib.Path, command: list[str]) -> list[str]:
+    """The command with a key file that is there."""
+    if "--signing-key" not in command:
+        return command
+    (place / "key").write_text(KEY.hex())
+    (place / "key").chmod(0o600)
+    at = command.index("--signing-key") + 1
+    return [*command[:at], str(place / "key"), *command[at + 1 :]]
+
+
 @contextmanager
 def _vehicle(command: list[str], scenario: testing.Scenario) -> Iterator[None]:
-    """A vehicle that sends to where the command listens, if it says where."""
-    port = next((part.rpartition(":")[2] for part in command if part.startswith("udp:")), None)
-    if port is None:
-        yield
-        return
-    with testing.FakeAutopilot(scenario, to=("127.0.0.1", int(port))):
+    """A vehicle that sends to where the command listens, or has its device, if it says where."""
+    key = KEY if "--signing-key" in command else None
+    with ExitStack() as ended:
+        for part in command:
+            if part.startswith("udp:"):
+                to = "127.0.0.1", int(part.rpartition(":")[2])
+            elif "/tty" in part:
+                cable = PtyBridge(pathlib.Path(part.partition(",")[0]))
+                cable.start()
+                ended.callback(cable.close)
+                to = cable.address
+            else:
+                continue
+            ended.enter_context(testing.FakeAutopilot(scenario, to=to, signing_key=key))
         yield
 
 

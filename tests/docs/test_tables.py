@@ -13,7 +13,7 @@ from typing import Any, get_args, get_type_hints
 
 import pytest
 
-from mav_robot_status.config import Config, IdentityConfig, LinkConfig, VehicleConfig
+from mav_robot_status.config import Config, IdentityConfig, LinkConfig, SigningConfig, VehicleConfig
 from mav_robot_status.config.model import Or
 from mav_robot_status.config.reader import PARAMETERS
 from mav_robot_status.controller import DEFAULT_PUBLISH_RATE
@@ -37,6 +37,7 @@ OTHER_TOOLS = {"--dialect", "--check"}  # options of MAVProxy and ruff
         ("## A link", LinkConfig),
         ("## A vehicle", VehicleConfig),
         ("## `identity`", IdentityConfig),
+        ("## `signing`", SigningConfig),
         ("## `hardware`", HardwareOptions),
     ],
 )
@@ -107,8 +108,8 @@ def test_the_fields_of_robot_status_with_their_types() -> None:
     assert [row[:2] for row in table("docs/mavlink.md", "field")] == fields
 
 
-def test_the_connections_that_this_version_can_open() -> None:
-    assert [row[0] for row in table("README.md", "connection")] == [kind.example for kind in KINDS if kind.opener]
+def test_the_connections_are_those_of_the_table_of_kinds() -> None:
+    assert [row[0] for row in table("README.md", "connection")] == [kind.example for kind in KINDS]
 
 
 def test_every_deviation_from_the_original_controller_is_listed() -> None:
@@ -122,12 +123,15 @@ def test_every_deviation_from_the_original_controller_is_listed() -> None:
     assert listed == in_code
 
 
+def _help(*module: str) -> str:
+    command = [sys.executable, "-m", *module, "--help"]
+    return subprocess.run(command, capture_output=True, text=True, timeout=30, check=True, cwd=ROOT).stdout
+
+
 def test_every_option_that_is_mentioned_exists() -> None:
-    command = [sys.executable, "-m", "mav_robot_status.cli"]
-    helps = [
-        subprocess.run([*command, name, "--help"], capture_output=True, text=True, timeout=30, check=True).stdout
-        for name in ("run", "explain", "demo", "check-config", "dialect")
-    ]
+    command = ["mav_robot_status.cli"]
+    subcommands = ("run", "explain", "doctor", "demo", "check-config", "dialect")
+    helps = [_help(*command, name) for name in subcommands] + [_help("fuzz"), _help("bench"), _help("bench.guard")]
     for document in DOCUMENTS:
         mentioned = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", document.read_text()))
         assert mentioned - OTHER_TOOLS <= set(re.findall(r"--[a-z-]+", "".join(helps))), document.name

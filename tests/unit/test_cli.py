@@ -69,7 +69,7 @@ def test_json_options_go_to_the_json_publishers() -> None:
 
 def test_json_none_takes_the_json_publishers_away() -> None:
     changed = overridden(Config(), options("--json", "none"))
-    assert [p.type for p in changed.controllers[0].publishers or ()] == ["mavlink"]
+    assert [p.type for p in changed.controllers[0].publishers or ()] == ["mavlink", "mirror"]
 
 
 def test_a_json_target_adds_a_publisher_where_the_file_has_none() -> None:

@@ -112,6 +112,21 @@ FAULTS = [
     ("identity: {component: 0}", "1:23", "component must be a whole number from 1 to 255, not 0"),
     ("identity: {component: auto}", "1:23", "component must be a whole number from 1 to 255, not 'auto'"),
     ("identity: {heartbeat: 1 Hz}", "1:23", "heartbeat must be true or false, not '1 Hz'"),
+    # signing
+    ("signing: {}", "1:10", "signing has no 'key_file', and must have one"),
+    ("signing:", "1:9", "signing has no 'key_file', and must have one"),
+    ("signing: {link_id: 1}", "1:10", "signing has no 'key_file', and must have one"),
+    ("signing: true", "1:10", "signing must be a mapping with the keys key_file, accept_unsigned, link_id, not true"),
+    ("signing: vehicle.key", "1:10", "signing must be a mapping with the keys key_file, accept_unsigned, link_id, not"),
+    ("signing: {keyfile: a}", "1:11", "signing has no key 'keyfile': did you mean 'key_file'?"),
+    ("signing: {key_file: }", "1:20", "key_file must be a text"),
+    ("signing: {key_file: 5}", "1:21", "key_file must be a text (in quotes if it looks like something else), not 5"),
+    ("signing: {key_file: a, link_id: 256}", "1:33", "link_id must be a whole number from 0 to 255, not 256"),
+    (
+        "signing: {key_file: a, accept_unsigned: radio}",
+        "1:41",
+        "accept_unsigned cannot be 'radio': it is one of: none, radio_status, all",
+    ),
     # hardware
     (
         "hardware:\n  heartbeat_timout: 3",
@@ -223,7 +238,10 @@ def test_whatever_is_written_raises_nothing_but_a_config_error(text: str) -> Non
     check(text)
 
 
-KEYS = "links|vehicles|hardware|identity|coalesce|requests|type|url|handle|system|mode_overrides|copter|c|77"
+KEYS = (
+    "links|vehicles|hardware|identity|signing|coalesce|requests|type|url|key_file|handle|system|mode_overrides|copter|"
+    "c|77"
+)
 LEAVES = (
     "~|1|-.inf|0b_|1:1|2026-99-99|auto|10 ms|AUTO|'x|\"\\U00110000\"|!!bool x|!!int ''|!!binary a|!!set {a}|<<|=|*a|"
     "&a b|udp:127.0.0.1:1|mav_robot_status/IndustrialRobotStatusController|"

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import fields
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 
@@ -15,12 +16,14 @@ from mav_robot_status.config import (
     IdentityConfig,
     LinkConfig,
     PublisherConfig,
+    SigningConfig,
     VehicleConfig,
     describe,
     load,
 )
 from mav_robot_status.hardware.options import HardwareOptions
 from mav_robot_status.interface import RobotMode
+from mav_robot_status.mavlink.signing import UNSIGNED_IDS
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "config").glob("*.yaml"))
 
@@ -181,6 +184,34 @@ def test_auto_and_any_are_none(tmp_path: Path) -> None:
     config = loaded(tmp_path, "vehicles: [{system: auto, component: any, handle: a}]\nidentity: {system: auto}")
     assert config.vehicles == (VehicleConfig(None, None, "a"),)
     assert config.identity == IdentityConfig(None, 192, True)
+
+
+def test_signing_needs_a_key_and_no_more(tmp_path: Path) -> None:
+    config = loaded(tmp_path, "signing: {key_file: vehicle.key}")
+    assert config.signing == SigningConfig("vehicle.key", "radio_status", 192)
+    config = loaded(tmp_path, "signing: {key_file: ~/vehicle.key, accept_unsigned: none, link_id: 0}")
+    assert config.signing == SigningConfig("~/vehicle.key", "none", 0)
+
+
+def test_without_signing_there_is_none(tmp_path: Path) -> None:
+    assert loaded(tmp_path, "signing: none").signing is None
+
+
+def test_the_words_for_unsigned_frames_are_those_of_the_verifier() -> None:
+    assert get_args(get_type_hints(SigningConfig)["accept_unsigned"]) == tuple(UNSIGNED_IDS)
+
+
+@pytest.mark.parametrize(
+    ("accept", "words"),
+    [
+        ("none", "nothing is taken unsigned"),
+        ("radio_status", "nothing but RADIO_STATUS is taken unsigned"),
+        ("all", "everything is taken unsigned too, so nothing that comes in is protected"),
+    ],
+)
+def test_signing_is_described(tmp_path: Path, accept: str, words: str) -> None:
+    config = loaded(tmp_path, f"signing: {{key_file: vehicle.key, accept_unsigned: {accept}, link_id: 7}}")
+    assert f"signing: with the key in vehicle.key, link ids from 7 on; {words}" in describe(config)
 
 
 def test_a_publisher_may_have_options(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import socket
 import threading
@@ -58,6 +59,11 @@ def address(live: Live) -> tuple[str, int]:
     link = live.stations[0].link
     assert isinstance(link, UdpLink)
     return "127.0.0.1", link.port
+
+
+def receive(live: Live, now: Instant) -> None:
+    live.switchboard.watch(select.poll())
+    live._receive(live.stations[0].link.fileno(), now)
 
 
 def heard(vehicle: socket.socket) -> list[Frame]:
@@ -147,7 +153,7 @@ def test_heartbeats_keep_their_phase(stdout: TextIO, vehicle: socket.socket) -> 
         start = clock.now()
         vehicle.sendto(autopilot(), address(live))
         time.sleep(0.01)
-        live._receive(live.stations[0], start)
+        receive(live, start)
         beats = []
         for late in (0.0, 1.04, 2.03, 3.02, 9.0, 10.0):
             live.turn(later(start, late))
@@ -165,7 +171,7 @@ def test_two_vehicles_are_spoken_for_and_asked_each_at_its_own_address(stdout: T
         vehicle.sendto(autopilot(7), address(live))
         second.sendto(autopilot(9), address(live))
         time.sleep(0.01)
-        live._receive(live.stations[0], start)
+        receive(live, start)
         live.turn(start)
         assert {f.system for f in heard(vehicle)} == {f.system for f in heard(second)} == {7, 9}
         live.turn(later(start, 3.01))
@@ -178,11 +184,11 @@ def test_a_vehicle_that_moves_to_another_address_is_asked_there(stdout: TextIO, 
     with closing(live), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as new:
         new.bind(("127.0.0.1", 0))
         start = Instant(50.0, 0)
-        for sender in (vehicle, new):
+        for sender, late in ((vehicle, 0.0), (new, 2.0)):
             sender.sendto(autopilot(), address(live))
             time.sleep(0.01)
-            live._receive(live.stations[0], start)
-        live.turn(start)
+            receive(live, later(start, late))
+            live.turn(later(start, late))
         live.turn(later(start, 3.01))
         assert [f for f in heard(new) if f.message_id == 76]
         assert not [f for f in heard(vehicle) if f.message_id == 76]

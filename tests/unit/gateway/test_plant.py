@@ -13,23 +13,18 @@ from mav_robot_status.clock import Instant, later
 from mav_robot_status.config import Config, ControllerConfig, PublisherConfig, VehicleConfig
 from mav_robot_status.errors import ConfigError, LinkError
 from mav_robot_status.gateway.plant import DEFAULT_CONTROLLER, Plant, check
+from mav_robot_status.interface import Audience
 from mav_robot_status.mavlink.definitions import Heartbeat
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.framing import Frame, Parser
 
+from ..publishers.port import Port
 from .third_party import Collecting
 
 OURS = "mav_robot_status/IndustrialRobotStatusController"
 START = Instant(100.0, 1_800_000_000_000_000)
+HEARER = Audience("ground station")
 NAME = "industrial_robot_status_handle"
-
-
-class Port:
-    def __init__(self) -> None:
-        self.sent: list[tuple[Any, int]] = []
-
-    def send(self, message: Any, system: int) -> None:
-        self.sent.append((message, system))
 
 
 def heartbeat(system: int = 1, armed: bool = False) -> Frame:
@@ -65,7 +60,7 @@ def live(plant: Plant, start: Instant, seconds: float) -> int:
 
 
 def test_every_autopilot_heard_gets_a_controller_on_a_handle_of_its_own(stdout: TextIO) -> None:
-    plant = Plant(Config(), Port(), stdout)
+    plant = Plant(Config(), Port(HEARER), stdout)
     plant.tick(START)
     plant.take(heartbeat(7), START)
     plant.take(heartbeat(9), START)
@@ -75,7 +70,7 @@ def test_every_autopilot_heard_gets_a_controller_on_a_handle_of_its_own(stdout: 
 
 
 def test_expected_vehicles_speak_before_they_are_heard(stdout: TextIO) -> None:
-    port = Port()
+    port = Port(HEARER)
     plant = Plant(Config(vehicles=(VehicleConfig(3, None, "rover"),)), port, stdout)
     plant.tick(START)
     plant.close(START)
@@ -85,7 +80,7 @@ def test_expected_vehicles_speak_before_they_are_heard(stdout: TextIO) -> None:
 
 
 def test_there_is_never_something_due_at_once_again(stdout: TextIO) -> None:
-    plant = Plant(Config(), Port(), stdout)
+    plant = Plant(Config(), Port(HEARER), stdout)
     plant.take(heartbeat(), START)
     plant.tick(START)
     assert live(plant, START, 5.0) < 5 * (10 + 10) + 20  # the lines, the looks of the hardware, and a few more
@@ -96,7 +91,7 @@ def test_two_controllers_share_an_output_of_the_same_options(installed: list[Col
     config = Config(controllers=(controller("a", OURS, PublisherConfig("collecting")),
                                  controller("b", OURS, PublisherConfig("collecting")),
                                  controller("c", OURS, PublisherConfig("collecting", {"x": 1}))))  # fmt: skip
-    plant = Plant(config, Port(), stdout)
+    plant = Plant(config, Port(HEARER), stdout)
     assert len(installed) == 2
     plant.close(START)
     assert all(made.closed for made in installed)
@@ -107,7 +102,7 @@ def test_a_controller_that_fails_is_stopped_and_the_others_go_on(
 ) -> None:
     config = Config(controllers=(controller("bad", "third_party/Faulty"),
                                  controller("good", OURS, PublisherConfig("json"))))  # fmt: skip
-    plant = Plant(config, Port(), stdout)
+    plant = Plant(config, Port(HEARER), stdout)
     plant.take(heartbeat(), START)
     with caplog.at_level(logging.ERROR):
         for tick in range(3):
@@ -125,7 +120,7 @@ def test_a_publisher_that_fails_leaves_its_controllers_other_outputs_alone(
     installed: list[Collecting], stdout: TextIO, caplog: pytest.LogCaptureFixture
 ) -> None:
     faulty, good = PublisherConfig("collecting", {"faulty": True}), PublisherConfig("collecting")
-    plant = Plant(Config(controllers=(controller("c", OURS, faulty, good),)), Port(), stdout)
+    plant = Plant(Config(controllers=(controller("c", OURS, faulty, good),)), Port(HEARER), stdout)
     plant.take(heartbeat(), START)
     plant.tick(START)
     plant.take(heartbeat(armed=True), later(START, 1))
@@ -145,14 +140,14 @@ def test_a_controller_that_cannot_be_made_is_an_error_and_leaves_nothing_open(
         controllers=(controller("c", "third_party/Impossible", PublisherConfig("collecting")),),
     )
     with pytest.raises(ConfigError, match="f:1:1: controller 'c' cannot be made: KeyError: 'gripper'"):
-        Plant(config, Port(), stdout)
+        Plant(config, Port(HEARER), stdout)
     assert installed[0].closed
 
 
 def test_an_output_that_cannot_be_opened_is_an_error_before_anything_is_heard(stdout: TextIO) -> None:
     config = Config(controllers=(controller("c", OURS, PublisherConfig("json", {"path": "/nowhere/x"})),))
     with pytest.raises(LinkError, match="cannot write JSON lines to /nowhere/x"):
-        Plant(config, Port(), stdout)
+        Plant(config, Port(HEARER), stdout)
 
 
 @pytest.mark.parametrize("kind", [OURS, "third_party/Faulty"])
@@ -171,7 +166,7 @@ def test_the_default_controller_needs_no_handle_of_the_default_name() -> None:
 
 
 def test_forgetting_begins_anew_and_goes_on_counting(stdout: TextIO) -> None:
-    plant = Plant(Config(), Port(), stdout)
+    plant = Plant(Config(), Port(HEARER), stdout)
     for _ in range(2):
         plant.take(heartbeat(), START)
         plant.tick(START)
@@ -182,15 +177,15 @@ def test_forgetting_begins_anew_and_goes_on_counting(stdout: TextIO) -> None:
 
 
 def test_statuses_go_out_as_mavlink_too(stdout: TextIO) -> None:
-    port = Port()
+    port = Port(HEARER)
     plant = Plant(Config(), port, stdout)
     plant.take(heartbeat(7), START)
     plant.tick(START)
     plant.close(START)
-    ((message, system),) = port.sent
+    ((message, system, _),) = port.sent
     assert (type(message).__name__, system, message.subject_system) == ("RobotStatus", 7, 7)
 
 
 def test_a_standard_output_without_a_descriptor_is_an_error_not_a_guess() -> None:
     with pytest.raises(ConfigError, match="publisher 'json' cannot be made"):
-        Plant(Config(), Port(), io.StringIO())
+        Plant(Config(), Port(HEARER), io.StringIO())

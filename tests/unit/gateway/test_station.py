@@ -31,64 +31,75 @@ def peer() -> Iterator[socket.socket]:
 
 def test_a_frame_cut_in_two_is_put_together_for_each_sender(station: Station) -> None:
     for source in ("a", "b"):
-        assert station.parser(source).feed(HEARTBEAT[:9]) == []
+        assert station.channel(source).parser.feed(HEARTBEAT[:9]) == []
     for source in ("a", "b"):
-        assert len(station.parser(source).feed(HEARTBEAT[9:])) == 1
+        assert len(station.channel(source).parser.feed(HEARTBEAT[9:])) == 1
     assert station.totals().frames == 2
 
 
 def test_a_flood_of_senders_leaves_a_bounded_number_of_parsers_and_are_all_counted(station: Station) -> None:
-    station.parser("vehicle").feed(HEARTBEAT[:9])
+    station.channel("vehicle").parser.feed(HEARTBEAT[:9])
     for number in range(MOST_SOURCES * 5):
-        station.parser(number).feed(HEARTBEAT)
-        station.parser("vehicle")  # heard now and then: it stays
-    assert len(station._parsers) == MOST_SOURCES
-    assert len(station.parser("vehicle").feed(HEARTBEAT[9:])) == 1
+        station.channel(number).parser.feed(HEARTBEAT)
+        station.channel("vehicle")  # heard now and then: it stays
+    assert len(list(station.channels())) == MOST_SOURCES
+    assert len(station.channel("vehicle").parser.feed(HEARTBEAT[9:])) == 1
     assert station.totals().frames == MOST_SOURCES * 5 + 1
 
 
 def test_a_parser_that_is_used_again_knows_nothing_of_its_last_sender(station: Station) -> None:
     for number in range(MOST_SOURCES):
-        station.parser(number).feed(HEARTBEAT[:9])
-    assert station.parser("new").feed(HEARTBEAT[9:]) == []
-    assert len(station.parser("new").feed(HEARTBEAT)) == 1
+        station.channel(number).parser.feed(HEARTBEAT[:9])
+    assert station.channel("new").parser.feed(HEARTBEAT[9:]) == []
+    assert len(station.channel("new").parser.feed(HEARTBEAT)) == 1
 
 
 def test_at_most_eight_peers_and_the_first_ones_stay(station: Station) -> None:
-    for number in range(10_000):
-        station.heard_autopilot(number, 0.0)
-    assert list(station.peers) == list(range(MOST_PEERS))
+    for number in range(MOST_SOURCES):
+        station.heard(station.channel(number), 0.0)
+    assert [channel.source for channel in station.peers()] == list(range(MOST_PEERS))
 
 
-def test_a_peer_is_forgotten_after_30_s_of_silence(station: Station) -> None:
-    station.heard_autopilot("old", 0.0)
-    station.heard_autopilot("young", 1.0)
+def test_a_peer_is_forgotten_after_30_s_of_silence_and_so_is_its_wish(station: Station) -> None:
+    old, young = station.channel("old"), station.channel("young")
+    station.heard(old, 0.0)
+    old.interval = 0.2
+    station.heard(young, 1.0)
     station.forget_silent(PEER_SILENCE + 0.5)
-    assert list(station.peers) == ["young"]
+    assert list(station.peers()) == [young]
+    assert old.interval is None
 
 
-def test_a_listening_station_sends_to_its_peers(station: Station, peer: socket.socket) -> None:
-    station.send(b"nobody hears this")
-    station.heard_autopilot(peer.getsockname(), 0.0)
-    station.send(b"one")
-    station.answer(b"two", peer.getsockname())
-    assert [peer.recv(100), peer.recv(100)] == [b"one", b"two"]
+def test_a_listening_station_sends_to_the_address_of_a_channel(station: Station, peer: socket.socket) -> None:
+    channel = station.channel(peer.getsockname())
+    assert not list(station.peers())
+    station.heard(channel, 0.0)
+    assert [c.send(b"one") for c in station.peers()] == [True]
+    assert peer.recv(100) == b"one"
+    assert str(channel).startswith("127.0.0.1:")
 
 
-def test_a_station_that_speaks_first_sends_to_its_address(peer: socket.socket) -> None:
+def test_a_station_that_speaks_first_has_one_end_whoever_answers(peer: socket.socket) -> None:
     out = Station(LinkConfig(f"udpout:127.0.0.1:{peer.getsockname()[1]}"), True)
     with contextlib.closing(out.link):
-        out.send(b"one")
-        out.answer(b"two", ("127.0.0.1", 9))
-        assert [peer.recv(100), peer.recv(100)] == [b"one", b"two"]
+        answering = out.channel(("127.0.0.1", 9))
+        assert list(out.peers()) == [answering] == [out.channel(("127.0.0.1", 10))]
+        assert answering.send(b"one")
+        assert peer.recv(100) == b"one"
+
+
+def test_another_connection_does_not_go_on_where_the_last_one_was_cut(peer: socket.socket) -> None:
+    out = Station(LinkConfig(f"udpout:127.0.0.1:{peer.getsockname()[1]}"))
+    with contextlib.closing(out.link):
+        assert out.channel(1).parser.feed(HEARTBEAT[:9]) == []
+        assert out.channel(2).parser.feed(HEARTBEAT[9:]) == []
+        assert len(out.channel(2).parser.feed(HEARTBEAT)) == 1
 
 
 def test_a_passive_station_sends_nothing(peer: socket.socket) -> None:
     passive = Station(LinkConfig("udpin:127.0.0.1:0", passive=True), False)
     with contextlib.closing(passive.link):
-        passive.heard_autopilot(peer.getsockname(), 0.0)
-        passive.send(b"no")
-        passive.answer(b"no", peer.getsockname())
+        assert not passive.channel(peer.getsockname()).send(b"no")
         peer.setblocking(False)
         with pytest.raises(BlockingIOError):
             peer.recv(100)

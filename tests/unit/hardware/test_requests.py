@@ -14,11 +14,12 @@ from mav_robot_status.hardware.requests import (
     REQUEST_MESSAGE,
     SET_MESSAGE_INTERVAL,
     TEMPORARILY_REJECTED,
+    UNSUPPORTED,
     Requests,
     Wanted,
     wanted_of,
 )
-from mav_robot_status.mavlink.definitions import CommandAck, CommandLong
+from mav_robot_status.mavlink.definitions import CommandAck, CommandLong, RequestDataStream
 
 US = (1, 192)
 FAILED = 4
@@ -31,7 +32,9 @@ def ack(result: int = ACCEPTED, command: int = SET_MESSAGE_INTERVAL, to: tuple[i
 
 
 def asked(requests: Requests, now: float, wanted: tuple[Wanted, ...] = ONE, modes: bool = False) -> CommandLong | None:
-    return requests.due(now, wanted, modes)
+    command = requests.due(now, wanted, Stack.PX4 if modes else Stack.ARDUPILOT)
+    assert not isinstance(command, RequestDataStream)
+    return command
 
 
 def answered(requests: Requests, now: float, wanted: tuple[Wanted, ...] = ONE, modes: bool = False) -> list[int]:
@@ -125,6 +128,32 @@ def test_a_refusal_is_final(requests: Requests) -> None:
     asked(requests, 103.0)
     requests.acknowledged(ack(FAILED), US, 103.1)
     assert answered(requests, 133.0) == []
+
+
+def refused(requests: Requests, result: int, stack: Stack, wanted: tuple[Wanted, ...] = ONE) -> object:
+    """What is asked for after the command for the first message was refused."""
+    assert requests.due(103.0, wanted, stack) is not None
+    requests.acknowledged(ack(result), US, 103.1)
+    return requests.due(103.1, wanted, stack)
+
+
+def test_an_old_ardupilot_that_does_not_know_the_command_is_asked_for_the_stream(requests: Requests) -> None:
+    four_hz = (Wanted(30, "ATTITUDE", 4.0, 40),)
+    assert refused(requests, UNSUPPORTED, Stack.ARDUPILOT, four_hz) == RequestDataStream(4, 1, 1, 10, 1)
+    assert requests.due(103.2, four_hz, Stack.ARDUPILOT) is None
+    assert requests.next_due() == 133.0
+
+
+def test_a_stream_of_which_something_comes_is_not_set_to_another_rate() -> None:
+    requests = Requests(1, 1, 100.0)
+    requests.arrived(30, 101.0)
+    four_hz = (Wanted(30, "ATTITUDE", 4.0, 40),)
+    assert refused(requests, UNSUPPORTED, Stack.ARDUPILOT, four_hz) is None
+
+
+@pytest.mark.parametrize(("result", "stack"), [(FAILED, Stack.ARDUPILOT), (UNSUPPORTED, Stack.PX4)])
+def test_nobody_else_is_asked_for_a_stream(requests: Requests, result: int, stack: Stack) -> None:
+    assert not isinstance(refused(requests, result, stack), RequestDataStream)
 
 
 def test_it_is_asked_twice_30_s_apart_and_then_lived_with(requests: Requests, caplog: pytest.LogCaptureFixture) -> None:

@@ -1,17 +1,23 @@
+import logging
+import math
 import os
 import select
+import shutil
 import socket
-import threading
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
 
 from mav_robot_status.errors import LinkError
-from mav_robot_status.link import udp
+from mav_robot_status.link import open_link
 from mav_robot_status.link.base import Link, Received
-from mav_robot_status.link.udp import UdpLink, port_owner
+from mav_robot_status.link.udp import ANSWER_SILENCE, UdpLink
 from mav_robot_status.link.url import parse
+
+from .conftest import Names
+from .ends import port_of
 
 Open = Callable[[str], UdpLink]
 
@@ -21,16 +27,14 @@ def fixture_open() -> Iterator[Open]:
     links = []
 
     def open_(text: str) -> UdpLink:
-        links.append(UdpLink(parse(text)))
-        return links[-1]
+        link = open_link(parse(text))
+        assert isinstance(link, UdpLink)
+        links.append(link)
+        return link
 
     yield open_
     for link in links:
         link.close()
-
-
-def port_of(link: UdpLink) -> int:
-    return int(link.text.rpartition(":")[2].removesuffix("/udp"))
 
 
 def heard(link: Link, limit: int = 64) -> list[Received]:
@@ -92,7 +96,7 @@ def test_a_port_that_is_taken_is_named_with_its_owner(open_: Open, host: str) ->
     with open("/proc/self/comm", encoding="utf-8") as comm:
         name = comm.read().strip()
     with pytest.raises(LinkError) as raised:
-        UdpLink(parse(f"udp:{host}:{port}"))
+        open_link(parse(f"udp:{host}:{port}"))
     assert str(raised.value) == (
         f"udp port {port} on {host.strip('[]')} is taken by {name} (pid {os.getpid()}); "
         "stop it or listen on another port"
@@ -105,27 +109,19 @@ def test_a_port_is_not_shared_even_with_a_program_that_would(open_: Open) -> Non
         other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         other.bind(("127.0.0.1", 0))
         with pytest.raises(LinkError, match="is taken by"):
-            UdpLink(parse(f"udp:127.0.0.1:{other.getsockname()[1]}"))
-
-
-def test_a_port_that_nobody_holds_has_no_owner(open_: Open) -> None:
-    link = open_("udpin:127.0.0.1:0")
-    port = port_of(link)
-    link.close()
-    assert port_owner(port) == ""
+            open_link(parse(f"udp:127.0.0.1:{other.getsockname()[1]}"))
 
 
 @pytest.mark.parametrize(
     ("text", "part"),
     [
-        ("udp:192.0.2.1:14550", "udp port 14550 on 192.0.2.1: this machine has no such address; listen on one"),
         ("udp:a..b:14550", "'a..b' is not a known host"),
         ("udp:999.1.1.1:14550", "'999.1.1.1' is not a known host"),
     ],
 )  # fmt: skip
-def test_an_address_that_cannot_be_listened_on_is_said_in_one_line(text: str, part: str) -> None:
+def test_a_host_that_is_none_is_said_in_one_line(text: str, part: str) -> None:
     with pytest.raises(LinkError) as raised:
-        UdpLink(parse(text))
+        open_link(parse(text))
     assert part in str(raised.value)
 
 
@@ -135,7 +131,7 @@ def test_a_port_without_permission_is_said_in_one_line() -> None:
         if int(first.read()) <= 1:
             pytest.skip("every port is open to everybody here")
     with pytest.raises(LinkError, match=r"udp port 1 on 127\.0\.0\.1: no permission"):
-        UdpLink(parse("udp:127.0.0.1:1"))
+        open_link(parse("udp:127.0.0.1:1"))
 
 
 def test_a_peer_that_is_not_there_yet_is_survived(open_: Open) -> None:
@@ -191,43 +187,30 @@ def test_what_the_kernel_dropped_is_counted(open_: Open) -> None:
     assert listening.dropped == sent - received
 
 
-def test_a_name_that_does_not_resolve_yet_is_asked_for_again(open_: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_that_is_not_known_yet_is_waited_for(
+    open_: Open, names: Names, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
     listening = open_("udpin:127.0.0.1:0")
-    known = threading.Event()
-    real = socket.getaddrinfo
-
-    def getaddrinfo(host: str, *args: Any, **options: Any) -> Any:
-        if host == "rover.test" and not known.is_set():
-            raise socket.gaierror(socket.EAI_AGAIN, "not yet")
-        return real("127.0.0.1", *args, **options)
-
-    monkeypatch.setattr(udp, "RESOLVE_EVERY", 0.01)
-    monkeypatch.setattr(udp, "RESOLVE_WAIT", 0.0)
-    monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
     sending = open_(f"udpout:rover.test:{port_of(listening)}")
-    assert sending.fileno() == -1
+    assert (sending.fileno(), sending.due(), sending.port) == (-1, -math.inf, 0)
     assert sending.receive() == []
     assert not sending.send(b"too early")
     assert sending.dropped == 1
-    known.set()
-    for thread in threading.enumerate():
-        if thread.name == "resolve rover.test":
-            thread.join(5)
+    for now in (100.0, 110.0):
+        names.ask(sending, now)
+        assert sending.fileno() == -1
+        assert now < sending.due() <= now + 0.4
+    names.known["rover.test"] = "127.0.0.1"
+    names.ask(sending, 120.0)
+    assert sending.due() == math.inf
     assert sending.send(b"now")
     assert [piece.data for piece in heard(listening)] == [b"now"]
-
-
-def test_asking_for_a_name_stops_when_the_link_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    def getaddrinfo(*args: Any, **options: Any) -> Any:
-        raise socket.gaierror(socket.EAI_NONAME, "unknown")
-
-    monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
-    link = UdpLink(parse("udpout:nowhere.test:9"))
-    [thread] = [thread for thread in threading.enumerate() if thread.name == "resolve nowhere.test"]
-    link.close()
-    thread.join(5)
-    assert not thread.is_alive()
-    assert not link.send(b"x")
+    text = f"sending to rover.test:{port_of(listening)}/udp"
+    assert caplog.messages == [
+        f"{text}: the name rover.test is not known yet, asking again",
+        f"{text}: rover.test is 127.0.0.1",
+    ]
 
 
 def test_a_closed_link_gives_and_takes_nothing(open_: Open) -> None:
@@ -236,3 +219,130 @@ def test_a_closed_link_gives_and_takes_nothing(open_: Open) -> None:
     assert link.fileno() == -1
     assert link.receive() == []
     assert not link.send(b"x")
+
+
+@pytest.fixture(name="crowd")
+def fixture_crowd() -> Iterator[list[socket.socket]]:
+    """Two who hear what is broadcast on the loopback interface."""
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as two,
+    ):
+        for hearing in (one, two):
+            hearing.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            hearing.bind(("127.255.255.255", one.getsockname()[1]))
+            hearing.settimeout(5)
+        yield [one, two]
+
+
+def test_a_broadcaster_is_heard_by_all_until_somebody_answers(
+    open_: Open, crowd: list[socket.socket], caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    link = open_(f"udpbcast:127.255.255.255:{crowd[0].getsockname()[1]}")
+    assert link.due() == math.inf
+    assert link.send(b"who is there")
+    assert [hearing.recv(100) for hearing in crowd] == [b"who is there"] * 2
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.settimeout(5)
+        peer.sendto(b"I am", ("127.0.0.1", link.port))
+        assert [piece.data for piece in heard(link)] == [b"I am"]
+        assert link.due() == -math.inf
+        link.service(100.0)
+        assert link.due() == 100.0 + ANSWER_SILENCE
+        assert link.send(b"good")
+        assert peer.recv(100) == b"good"
+
+        peer.sendto(b"still here", ("127.0.0.1", link.port))
+        assert [piece.data for piece in heard(link)] == [b"still here"]
+        link.service(125.0)
+        link.service(125.0 + ANSWER_SILENCE - 0.1)
+        assert link.send(b"and still")
+        assert peer.recv(100) == b"and still"
+
+        link.service(125.0 + ANSWER_SILENCE)
+        assert link.due() == math.inf
+        assert link.send(b"who else")
+        assert [hearing.recv(100) for hearing in crowd] == [b"who else"] * 2
+        where = f"127.0.0.1:{peer.getsockname()[1]}"
+    assert caplog.messages == [
+        f"{link.text}: {where} answers, sending to it",
+        f"{link.text}: {where} is silent, broadcasting again",
+    ]
+
+
+def test_others_do_not_keep_a_silent_peer_of_a_broadcaster(open_: Open, crowd: list[socket.socket]) -> None:
+    link = open_(f"udpbcast:127.255.255.255:{crowd[0].getsockname()[1]}")
+    peer, other = open_("udpin:127.0.0.1:0"), open_("udpin:127.0.0.1:0")
+    assert link.send(b"who is there")
+    peer.send(b"first", ("127.0.0.1", link.port))
+    assert len(heard(link)) == 1
+    link.service(100.0)
+    other.send(b"second", ("127.0.0.1", link.port))
+    assert len(heard(link)) == 1
+    assert link.due() == 100.0 + ANSWER_SILENCE
+
+
+def test_what_cannot_be_broadcast_without_saying_so_is_told_once(open_: Open, caplog: pytest.LogCaptureFixture) -> None:
+    link = open_("udpout:255.255.255.255:9")
+    assert not any(link.send(b"x") for _ in range(3))
+    assert link.dropped == 3
+    assert caplog.messages == [
+        "sending to 255.255.255.255:9/udp: cannot send to 255.255.255.255:9: that is a broadcast address, "
+        "for which write udpbcast:"
+    ]
+
+
+NETWORKS = """
+import logging, subprocess, sys
+logging.basicConfig(level=logging.INFO, format="%(message)s", stream=sys.stdout)
+from mav_robot_status.link import open_link
+from mav_robot_status.link.url import parse
+def ip(words): subprocess.run(["ip", *words.split()], check=True)
+ip("link set lo up")
+udp, tcp = (open_link(parse(text)) for text in ("udp:10.77.0.1:14550", "tcpin:10.77.0.1:5760"))
+sending = open_link(parse("udpout:10.77.0.1:14550"))
+now = 100.0
+for _ in range(5):
+    for link in (udp, tcp):
+        assert link.due() <= now, link.due()
+        link.service(now)
+        assert now < link.due() <= now + 5
+        assert link.receive() == []
+    assert not sending.send(b"nobody")
+    now += 5
+assert udp.fileno() == -1 and not udp.send(b"x")
+ip("addr add 10.77.0.1/32 dev lo")
+for link in (udp, tcp):
+    link.service(now)
+    assert link.due() == float("inf"), link.due()
+assert sending.send(b"here") and [piece.data for piece in udp.receive()] == [b"here"]
+client = open_link(parse("tcp:10.77.0.1:5760"))
+client.service(now)
+assert client.send(b"there") and tcp.receive() == [] and [piece.data for piece in tcp.receive()] == [b"there"]
+for link in (udp, tcp, sending, client): link.close()
+"""
+
+
+def test_an_interface_that_comes_up_later_is_waited_for() -> None:
+    """In a network of its own, where the address is added later."""
+    alone = ["unshare", "--user", "--map-root-user", "--net"]
+    there = all(map(shutil.which, ("unshare", "ip")))
+    if not there or subprocess.run([*alone, "ip", "link"], capture_output=True, check=False).returncode:
+        pytest.skip("this system gives nobody a network of his own")
+    done = subprocess.run([*alone, sys.executable, "-c", NETWORKS], capture_output=True, text=True, check=False)
+    assert (done.stderr, done.returncode) == ("", 0)
+    udp, tcp = "listening on 10.77.0.1:14550/udp", "listening on 10.77.0.1:5760/tcp"
+    lines = done.stdout.splitlines()
+    client = lines.pop().removesuffix(" has connected")
+    assert client.startswith(f"{tcp}: 10.77.0.1:")
+    assert lines == [
+        f"{udp} waits for an interface with this address",
+        f"{tcp} waits for an interface with this address",
+        "sending to 10.77.0.1:14550/udp: cannot send to 10.77.0.1:14550: network is unreachable",
+        f"{udp}: the address is there now",
+        f"{tcp}: the address is there now",
+        "sending to 10.77.0.1:14550/udp: can send to 10.77.0.1:14550 again",
+        "connected to 10.77.0.1:5760/tcp",
+    ]

@@ -25,6 +25,8 @@ from mav_robot_status.interface import (
 )
 from mav_robot_status.publishers.json_lines import PIPE_BUF, JsonLinesPublisher
 
+from .port import Port
+
 STAMP = 1_795_200_547_123_456
 NOW = Instant(10.0, STAMP)
 STATUS = RobotStatus(
@@ -38,11 +40,6 @@ DETAIL = Detail(
     Vehicle("ARDUPILOTMEGA", "GROUND_ROVER", "GUIDED", 15, "ACTIVE"),
 )
 MSG = RobotStatusMsg("robot", STAMP, STATUS, DETAIL, 0.4124)
-
-
-class Nobody:
-    def send(self, message: Any, system: int) -> None:
-        raise AssertionError("JSON lines are not MAVLink")
 
 
 class Pipe:
@@ -77,7 +74,7 @@ def pipe() -> Iterator[Pipe]:
 
 
 def on(pipe: Pipe, patient: bool = False, **options: Any) -> JsonLinesPublisher:
-    return JsonLinesPublisher(PublisherContext(options, Nobody(), pipe.stdout, patient))
+    return JsonLinesPublisher(PublisherContext(options, Port(), pipe.stdout, patient))
 
 
 def test_a_native_line_is_as_the_contract_says(pipe: Pipe) -> None:
@@ -196,14 +193,14 @@ def test_on_replay_nothing_is_lost_and_lines_go_out_at_the_end(pipe: Pipe) -> No
 def test_a_file_is_appended_to_and_closed(tmp_path: Path) -> None:
     path = tmp_path / "lines"
     for _ in range(2):
-        publisher = JsonLinesPublisher(PublisherContext({"path": str(path)}, Nobody(), io.StringIO()))
+        publisher = JsonLinesPublisher(PublisherContext({"path": str(path)}, Port(), io.StringIO()))
         publisher.publish(MSG)
         publisher.close()
     assert len(path.read_text("utf-8").splitlines()) == 2
 
 
 def test_a_full_disk_is_an_error_for_the_person() -> None:
-    publisher = JsonLinesPublisher(PublisherContext({"path": "/dev/full"}, Nobody(), io.StringIO()))
+    publisher = JsonLinesPublisher(PublisherContext({"path": "/dev/full"}, Port(), io.StringIO()))
     with pytest.raises(LinkError, match="cannot write JSON lines to /dev/full: No space left on device"):
         publisher.publish(MSG)
     publisher._rest = b""

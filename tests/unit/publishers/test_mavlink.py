@@ -1,12 +1,13 @@
 from __future__ import annotations
 
 import io
-from typing import Any
+import math
 
 import pytest
 
-from mav_robot_status.clock import Instant
+from mav_robot_status.errors import UsageError
 from mav_robot_status.interface import (
+    Audience,
     Detail,
     Inhibit,
     LinkState,
@@ -18,20 +19,15 @@ from mav_robot_status.interface import (
 )
 from mav_robot_status.publishers.mavlink import MavlinkPublisher, message_of
 
-SEEN = Detail(1, 1)
+from .port import SEEN, Port, msg, publish, run
 
-
-class Port:
-    def __init__(self) -> None:
-        self.sent: list[tuple[Any, int]] = []
-
-    def send(self, message: Any, system: int) -> None:
-        self.sent.append((message, system))
+STATION = Audience("station")
+ROVER = Audience("rover")
 
 
 @pytest.fixture
 def port() -> Port:
-    return Port()
+    return Port(STATION)
 
 
 @pytest.fixture
@@ -39,13 +35,8 @@ def publisher(port: Port) -> MavlinkPublisher:
     return MavlinkPublisher(PublisherContext({}, port, io.StringIO()))
 
 
-def msg(code: int = 0, detail: Detail = SEEN, handle: str = "robot") -> RobotStatusMsg:
-    return RobotStatusMsg(handle, 1_000_000, RobotStatus(error_code=code), detail, 0.1)
-
-
-def publish(publisher: MavlinkPublisher, at: float, message: RobotStatusMsg) -> float | None:
-    publisher.publish(message)
-    return publisher.service(Instant(at, 0))
+def failing(code: int, detail: Detail = SEEN) -> RobotStatusMsg:
+    return msg(RobotStatus(error_code=code), detail)
 
 
 def test_a_message_says_all_of_a_status() -> None:
@@ -59,21 +50,20 @@ def test_a_message_says_all_of_a_status() -> None:
 
 @pytest.mark.parametrize("period", [0.1, 0.3, 0.7])
 def test_any_rate_is_thinned_to_1_hz_on_average(publisher: MavlinkPublisher, port: Port, period: float) -> None:
-    for tick in range(round(60 / period)):
-        publish(publisher, tick * period, msg())
+    run(publisher, 60, period)
     assert len(port.sent) == pytest.approx(60, abs=1)
 
 
 def test_a_change_goes_out_at_once_and_at_most_5_a_second_with_the_last_always_sent(
     publisher: MavlinkPublisher, port: Port
 ) -> None:
-    publish(publisher, 0.0, msg())
+    publish(publisher, 0.0, failing(0))
     for number in range(1, 20):
-        again = publish(publisher, number * 0.01, msg(number))
-    assert [m.error_code for m, _ in port.sent] == [0, 1, 2, 3, 4, 5]
+        again = publish(publisher, number * 0.01, failing(number))
+    assert [s.message.error_code for s in port.sent] == [0, 1, 2, 3, 4, 5]
     assert again == 1.0
-    assert publisher.service(Instant(again, 0)) is None
-    assert port.sent[-1][0].error_code == 19
+    assert publish(publisher, again) is None
+    assert port.sent[-1].message.error_code == 19
 
 
 def test_after_a_pause_the_phase_begins_anew(publisher: MavlinkPublisher, port: Port) -> None:
@@ -83,20 +73,136 @@ def test_after_a_pause_the_phase_begins_anew(publisher: MavlinkPublisher, port: 
 
 
 def test_of_a_vehicle_never_heard_nothing_is_said(publisher: MavlinkPublisher, port: Port) -> None:
-    assert publish(publisher, 0.0, msg(detail=Detail(5, None, link=LinkState.NEVER_SEEN))) is None
-    assert publish(publisher, 0.1, msg(detail=Detail(None, None))) is None
+    unheard, unnamed = Detail(5, None, link=LinkState.NEVER_SEEN), Detail(None, None)
+    port.asked = [("station", 5)]
+    assert publish(publisher, 0.0, msg(detail=unheard), msg(detail=unnamed, handle="other")) is None
     assert port.sent == []
 
 
 def test_a_lost_vehicle_is_still_spoken_of(publisher: MavlinkPublisher, port: Port) -> None:
     publish(publisher, 0.0, msg(detail=Detail(5, 1, link=LinkState.LOST)))
-    assert [system for _, system in port.sent] == [5]
+    assert [s.system for s in port.sent] == [5]
 
 
 def test_handles_are_thinned_each_for_itself(publisher: MavlinkPublisher, port: Port) -> None:
-    publisher.publish(msg(handle="a"))
-    publisher.publish(msg(handle="b", detail=Detail(2, 1)))
-    publisher.service(Instant(0.0, 0))
-    assert [system for _, system in port.sent] == [1, 2]
+    publish(publisher, 0.0, msg(handle="a"), msg(handle="b", detail=Detail(2, 1)))
+    assert [s.system for s in port.sent] == [1, 2]
     assert not publisher.busy()
     publisher.close()
+
+
+@pytest.mark.parametrize(("interval", "in_10_s"), [(0.1, 101), (0.25, 41), (0.05, 101), (5.0, 3)])
+def test_an_audience_hears_as_often_as_it_asked_but_no_more_than_is_published(
+    publisher: MavlinkPublisher, port: Port, interval: float, in_10_s: int
+) -> None:
+    port.present = [STATION._replace(interval=interval), ROVER]
+    run(publisher, 10.0)
+    assert [s.key for s in port.sent].count("station") == in_10_s
+    assert [s.key for s in port.sent].count("rover") == 11
+
+
+def test_what_is_published_a_little_early_is_not_left_out(publisher: MavlinkPublisher, port: Port) -> None:
+    port.present = [STATION._replace(interval=0.1)]
+    for tick in range(100):
+        publish(publisher, tick * 0.1 + (0.006 if tick % 2 == 0 else 0.0), msg())
+    assert len(port.sent) == 100
+
+
+def test_whoever_asked_for_a_long_interval_still_hears_changes(publisher: MavlinkPublisher, port: Port) -> None:
+    port.present = [STATION._replace(interval=60.0)]
+    run(publisher, 1.0)
+    publish(publisher, 1.1, failing(7))
+    assert [s.message.error_code for s in port.sent] == [0, 7]
+
+
+def test_whoever_wants_none_hears_nothing_not_even_changes(publisher: MavlinkPublisher, port: Port) -> None:
+    port.present = [STATION._replace(interval=math.inf), ROVER]
+    run(publisher, 5.0)
+    assert publish(publisher, 5.1, failing(7)) is None
+    assert {s.key for s in port.sent} == {"rover"}
+
+
+def test_an_audience_that_appears_hears_at_once_how_things_are(publisher: MavlinkPublisher, port: Port) -> None:
+    publish(publisher, 0.0, failing(7))
+    port.taken()
+    port.present.append(ROVER)
+    publish(publisher, 0.01)
+    assert [(s.key, s.message.error_code) for s in port.taken()] == [("rover", 7)]
+    publish(publisher, 0.02)
+    assert port.sent == []
+
+
+def test_what_was_published_long_ago_is_not_sent_again_by_itself(publisher: MavlinkPublisher, port: Port) -> None:
+    publish(publisher, 0.0, msg())
+    port.taken()
+    port.present.append(ROVER)
+    publish(publisher, 60.0)
+    assert [s.key for s in port.sent] == ["rover"]
+
+
+def test_what_is_not_known_any_more_is_told_to_nobody(publisher: MavlinkPublisher, port: Port) -> None:
+    publish(publisher, 0.0, msg())
+    port.taken()
+    publish(publisher, 0.1, msg(detail=Detail(1, None, link=LinkState.NEVER_SEEN)))
+    port.present.append(ROVER)
+    port.asked = [("station", 1)]
+    publish(publisher, 0.2)
+    assert port.sent == []
+
+
+@pytest.mark.parametrize("pause", [[], [STATION._replace(interval=math.inf)]])
+def test_an_audience_that_comes_back_is_told_at_once(
+    publisher: MavlinkPublisher, port: Port, pause: list[Audience]
+) -> None:
+    publish(publisher, 0.0, msg())
+    port.present = pause
+    publish(publisher, 0.1, msg())
+    port.taken()
+    port.present = [STATION]
+    publish(publisher, 0.2)
+    assert [s.key for s in port.sent] == ["station"]
+
+
+def test_nothing_is_remembered_of_audiences_that_have_gone(publisher: MavlinkPublisher, port: Port) -> None:
+    for number in range(100):
+        port.present = [Audience(number)]
+        publish(publisher, number * 0.1, msg())
+    assert len(port.sent) == 100
+    assert list(publisher._told) == [99]
+
+
+def test_a_change_is_held_back_only_from_those_who_have_heard_enough(publisher: MavlinkPublisher, port: Port) -> None:
+    for number in range(6):
+        publish(publisher, number * 0.01, failing(number))
+    port.taken()
+    port.present.append(ROVER)
+    assert publish(publisher, 0.1, failing(6)) == 1.0
+    assert [s.key for s in port.taken()] == ["rover"]
+    publish(publisher, 1.0)
+    assert [(s.key, s.message.error_code) for s in port.sent] == [("station", 6)]
+
+
+@pytest.mark.parametrize("interval", [None, math.inf])
+def test_who_asks_once_is_told_once_and_at_once(
+    publisher: MavlinkPublisher, port: Port, interval: float | None
+) -> None:
+    port.present = [STATION._replace(interval=interval), ROVER]
+    publish(publisher, 0.0, failing(7), msg(detail=Detail(2, 1), handle="other"))
+    port.taken()
+    port.asked = [("station", 1)]
+    publish(publisher, 0.01)
+    publish(publisher, 0.02)
+    assert [(s.key, s.system, s.message.error_code) for s in port.sent] == [("station", 1, 7)]
+
+
+def test_who_asks_and_goes_is_not_answered(publisher: MavlinkPublisher, port: Port) -> None:
+    publish(publisher, 0.0, msg())
+    port.taken()
+    port.asked = [("gone", 1), ("station", 9)]
+    publish(publisher, 0.01)
+    assert port.sent == []
+
+
+def test_an_option_is_an_error(port: Port) -> None:
+    with pytest.raises(UsageError, match="mavlink: unknown option 'rate'; there are none"):
+        MavlinkPublisher(PublisherContext({"rate": 5}, port, io.StringIO()))

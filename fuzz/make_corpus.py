@@ -1,0 +1,58 @@
+"""Writes the corpus, from our own encoder, examples and tables: `python fuzz/make_corpus.py`."""
+
+from __future__ import annotations
+
+import random
+import struct
+from pathlib import Path
+
+from mav_robot_status.link.url import KINDS
+from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
+from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.signing import Signer
+
+HERE = Path(__file__).parent
+EXAMPLES = HERE.parent / "config"
+
+
+def write(target: str, entries: list[bytes]) -> None:
+    """One file for each entry."""
+    folder = HERE / "corpus" / target
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.iterdir():
+        old.unlink()
+    for number, entry in enumerate(entries):
+        (folder / f"{number:02}").write_bytes(entry)
+
+
+def frames(version: int) -> list[bytes]:
+    """A frame of every message that we know, with fields that are not all zero."""
+    rng = random.Random(version)
+    made = []
+    for sequence, definition in enumerate(MESSAGES.values()):
+        if version == 2 or definition.id < 256:
+            values = definition.layout.unpack(rng.randbytes(definition.layout.size))
+            message = definition.type._make(values)
+            made.append(encode(message, system=1, component=1, sequence=sequence & 255, version=version))
+    return made
+
+
+def main() -> None:
+    """Write everything."""
+    signer = Signer(bytes(range(32)), 3)
+    signed = [signer.sign(frame, 1_800_000_000_000_000 + 10 * i) for i, frame in enumerate(frames(2))]
+    write("framing", [b"".join(frames(1)), b"".join(frames(2)), b"".join(signed[:8]), *frames(2)[:6]])
+    write("signing", [b"".join(signed[:8]), *signed[:4], b"".join(frames(2)[:4])])
+    heartbeat = struct.pack("<IBBBBB", 4, 2, 3, 209, 4, 3)
+    story = [bytes([8, 16, number % 3, number]) + heartbeat[: 9 - number % 4] for number in range(60)]
+    rng = random.Random(7)
+    write("messages", [b"".join(story), rng.randbytes(2000), b"".join(story[:9]) + rng.randbytes(600)])
+    text = encode(Statustext(2, b"PreArm: Compass not calibrated", 7, 1), system=1, component=1, sequence=0)
+    write("texts", [b"".join(bytes([20, 3, n % 4, n]) + text[10:30] for n in range(12)), rng.randbytes(500)])
+    write("configuration", [path.read_bytes() for path in sorted(EXAMPLES.glob("*.yaml"))])
+    forms = [form for kind in KINDS for form in kind.forms.split()]
+    write("connection", [kind.example.encode() for kind in KINDS] + [form.encode() for form in forms])
+
+
+if __name__ == "__main__":
+    main()

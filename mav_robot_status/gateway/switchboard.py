@@ -1,0 +1,284 @@
+"""All live links: what comes in on them, who is where, and what we send under our identity."""
+
+from __future__ import annotations
+
+import logging
+import math
+import select
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from ..hardware.robot_hw import COMMAND_IDS, WANTED_IDS
+from ..interface import Audience, TriState
+from ..link.record import TlogWriter
+from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
+from ..mavlink.component import LONELY_SYSTEM, Component
+from ..mavlink.decode import decode
+from ..mavlink.signing import Verdict
+from .paths import Paths
+from .routing import Router
+from .station import Station
+from .trust import Trust
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from ..clock import Instant
+    from ..config import Config
+    from ..hardware.robot_hw import Tracked
+    from ..mavlink.framing import Frame
+    from .station import Channel
+
+log = logging.getLogger(__name__)
+
+SETUP_SIGNING: Final = 256
+"""Carries a key: passed on to nobody."""
+
+
+class Heard(NamedTuple):
+    """A frame that somebody here wants, and where it came from."""
+
+    frame: Frame
+    channel: Channel
+
+
+class Switchboard:
+    """The links of one gateway and the channels on them. It is the `MavlinkPort` of the publishers."""
+
+    def __init__(self, config: Config, clock: Callable[[], Instant]) -> None:
+        """Open everything. Raises LinkError, UsageError."""
+        self._clock = clock
+        self.component = Component(config.identity.component, config.identity.system)
+        self.offered: frozenset[int] = frozenset({HEARTBEAT} if config.identity.heartbeat else ())
+        """The messages of ours that can be asked for."""
+        self.paths: Paths[Channel] = Paths()
+        self.conflicts: set[tuple[int, int]] = set()
+        """Ids that two autopilots claim, found since the last look."""
+        self.stations: list[Station] = []
+        self._watched: dict[int, Station] = {}
+        self._requests: set[tuple[Channel, int]] = set()
+        self._ends: tuple[Channel, ...] | None = None
+        """Everyone a frame may be passed on to; None: to be found anew."""
+        self._router: Router[Channel] | None = Router() if config.forward else None
+        self._keep_all = config.forward or config.record is not None
+        with ExitStack() as opened:  # what fails half-way leaves nothing open
+            self._trust = Trust(config.signing, clock()) if config.signing else None
+            for link, is_out in [*((link, False) for link in config.links), *((out, True) for out in config.outs)]:
+                self.stations.append(Station(link, is_out, len(self.stations), keep_all=self._keep_all))
+                opened.callback(self.stations[-1].link.close)
+            self._recorder = None if config.record is None else TlogWriter(config.record)
+            opened.pop_all()
+        for station in self.stations:
+            log.info("%s%s", station.link.text, " (passive)" if station.passive else "")
+        if self._recorder is not None:
+            log.info("%s", self._recorder.text)
+
+    # what comes in
+
+    def watch(self, poll: select.poll) -> None:
+        """Wait also for the links that have got a descriptor since."""
+        if len(self._watched) == len(self.stations):
+            return
+        for station in self.stations:
+            descriptor = station.link.fileno()
+            if descriptor >= 0 and descriptor not in self._watched:
+                poll.register(descriptor, select.POLLIN)
+                self._watched[descriptor] = station
+
+    def receive(self, descriptor: int, now: Instant) -> list[Heard]:
+        """What has come on the link with this descriptor, of the kinds that a status needs."""
+        heard: list[Heard] = []
+        station = self._watched.get(descriptor)
+        if station is None:
+            return heard
+        for data, source in station.link.receive():
+            channel = station.channel(source)
+            frames = channel.parser.feed(data)
+            if self._keep_all:
+                self._pass_on(data, frames, channel, now)
+                frames = [frame for frame in frames if frame.message_id in WANTED_IDS]
+            for frame in frames:
+                if self._believes(frame, channel, now):
+                    heard.append(Heard(frame, channel))
+        return heard
+
+    def _believes(self, frame: Frame, channel: Channel, now: Instant) -> bool:
+        """Whether a frame is one that the hardware is to take; what is meant for us is dealt with."""
+        verdict = None if self._trust is None else self._trust.judge(frame, now)
+        if verdict is not None and verdict not in (Verdict.VERIFIED, Verdict.LET_THROUGH):
+            if frame.message_id == HEARTBEAT and self._trust and self._trust.may_heal(verdict, now.mono):
+                self._send(channel, self.component.heartbeat(frame.system, False, channel.encoders))
+            return False
+        station = channel.station
+        if frame.message_id == HEARTBEAT:
+            self.component.heard(frame)
+            if station.is_out:
+                self._heard_at(channel, now.mono)
+        elif frame.message_id in COMMAND_IDS:
+            if station.is_peer(channel) and verdict in (None, Verdict.VERIFIED):
+                self._obey(frame, channel)
+            if station.is_out:
+                return self._router is not None  # passed on to a vehicle: the hardware overhears it
+        if station.is_out:
+            return False
+        if verdict is Verdict.VERIFIED:  # newer than all that came before, whichever way it came
+            self.paths.take((frame.system, frame.component), channel, now.mono)
+            return True
+        return self._counts(frame, channel, now.mono)
+
+    def _counts(self, frame: Frame, channel: Channel, now: float) -> bool:
+        """Whether a frame came the way that counts for its vehicle."""
+        if self.paths.counts(frame, channel, now):
+            return True
+        ends = self.paths.conflict(frame, channel)
+        if ends is not None:
+            ids = frame.system, frame.component
+            self.conflicts.add(ids)
+            log.warning("two autopilots claim the ids %d.%d: %s and %s", *ids, *ends)
+        return False
+
+    def heard_vehicle(self, ids: tuple[int, int], channel: Channel, now: float) -> None:
+        """A heartbeat of a vehicle came from this channel."""
+        self._heard_at(channel, now)
+        self.paths.learn(ids, channel, now)
+
+    def _heard_at(self, channel: Channel, now: float) -> None:
+        if channel.station.heard(channel, now):
+            self._ends = None
+
+    def _obey(self, frame: Frame, channel: Channel) -> None:
+        """A command, perhaps to us: answer it, and do what it says."""
+        hears_statuses = self._hears_statuses(channel.station)
+        offered = self.offered if hears_statuses else self.offered - {ROBOT_STATUS}
+        sender = frame.system, frame.component
+        found = answer(decode(frame), sender, self.component.speaks_as, channel.interval, offered)
+        if found is None:
+            return
+        for reply in found.replies:
+            self.tell(channel, reply, found.system)
+        channel.interval = found.interval
+        if found.once == HEARTBEAT:
+            self._send(channel, self.component.heartbeat(found.system, False, channel.encoders))
+        elif found.once == ROBOT_STATUS:
+            vehicles = {system for system, _ in self.paths.vehicles()}
+            self._requests |= {(channel, v) for v in vehicles if self.component.system_for(v) == found.system}
+
+    def _pass_on(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant) -> None:
+        """Record what came, and send it to whom it concerns."""
+        if self._recorder is not None:
+            for frame in frames:
+                self._recorder.write(now.unix_us, frame.raw)
+        if self._router is None or not channel.station.is_peer(channel):
+            return
+        frames = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
+        if self._ends is None:
+            self._ends = tuple(end for station in self.stations for end in station.peers())
+        whole = b"" if channel.station.link.stream else data
+        for part, ends in self._router.plan(whole, frames, channel, self._ends, now.mono):
+            for end in ends:
+                end.send(part)
+
+    # what goes out
+
+    def audiences(self) -> list[Audience]:
+        """Everyone who hears statuses: peers and outs; of serial devices only outs, autopilots drop unknown ids."""
+        return [
+            Audience(channel, channel.interval, mirror=station.is_out)
+            for station in self.stations
+            if self._hears_statuses(station)
+            for channel in station.peers()
+        ]
+
+    def _hears_statuses(self, station: Station) -> bool:
+        return not station.passive and (station.is_out or station.robot_status)
+
+    def requests(self) -> set[tuple[Channel, int]]:
+        """`MavlinkPort`: who asked for a status, once, and of which system; since the last call."""
+        asked, self._requests = self._requests, set()
+        return asked
+
+    def send(self, message: Any, system: int, audience: Audience) -> None:
+        """`MavlinkPort`: to one audience, about the vehicle with this system id."""
+        self.tell(audience.key, message, system)
+
+    def tell(self, channel: Any, message: Any, system: int) -> None:
+        """Send one message to one end, under the identity that we have beside this system."""
+        self._send(channel, self.component.frame(message, system, channel.encoders))
+
+    def _send(self, channel: Channel, frame: bytes) -> None:
+        """Send a frame of ours: signed, and recorded."""
+        if self._trust is not None or self._recorder is not None:
+            unix_us = self._clock().unix_us
+            if self._trust is not None:
+                frame = self._trust.sign(frame, unix_us, channel.station.number)
+            if self._recorder is not None and not channel.passive:
+                self._recorder.write(unix_us, frame)
+        channel.send(frame)
+
+    def beat(self, vehicles: Iterable[Tracked], now: float) -> None:
+        """Our heartbeat: beside each vehicle heard; alone only where we must speak first."""
+        for station in self.stations:
+            station.forget_silent(now)
+        self._ends = None
+        in_error: dict[int, bool] = {}
+        for tracked in vehicles:
+            if tracked.ids is not None:
+                system = self.component.system_for(tracked.ids[0])
+                in_error[system] = in_error.get(system, False) or tracked.handle.status.in_error is TriState.TRUE
+        for station in self.stations:
+            if station.passive or (not in_error and (station.is_out or not station.must_speak)):
+                continue
+            for channel in station.peers():
+                for system, wrong in (in_error or {LONELY_SYSTEM: False}).items():
+                    self._send(channel, self.component.heartbeat(system, wrong, channel.encoders))
+
+    # keeping the links
+
+    def service(self, now: float) -> None:
+        """Connect and reconnect what waits for its turn."""
+        if self._trust is not None:
+            self._trust.keep()
+        for station in self.stations:
+            if now >= station.link.due():
+                station.link.service(now)
+
+    def next_due(self) -> float:
+        """When (monotonic seconds) `service` has something to do."""
+        return min((station.link.due() for station in self.stations), default=math.inf)
+
+    def close(self) -> None:
+        """Close the links, tell in the log what was counted."""
+        with ExitStack() as steps:  # each is done, whatever the others raise
+            for station in self.stations:
+                steps.callback(station.link.close)
+                steps.callback(_tell_counters, station)
+            if self._trust is not None:
+                steps.callback(self._trust.close)
+            if self._recorder is not None:
+                steps.callback(self._recorder.close)
+        if self.paths.duplicates:
+            log.info("%d frames came a second way, %d changes of the way", self.paths.duplicates, self.paths.changes)
+
+    def tell_silence(self) -> None:
+        """Say on which links no autopilot is heard."""
+        for station in self.stations:
+            if not station.is_out:
+                got = station.totals()
+                heard = f"{got.frames} MAVLink frames" if got.frames else "nothing that is MAVLink"
+                log.warning("no autopilot heard yet, %s: %s so far", station.link.text, heard)
+        if self._trust is not None and (found := self._trust.summary()):
+            log.warning("signing: %s", found)
+
+
+def _tell_counters(station: Station) -> None:
+    got = station.totals()
+    log.info(
+        "%s: %d frames, %d lost, %d with a bad CRC, %d of unknown kind, %d bytes of garbage, %d datagrams dropped",
+        station.link.text,
+        got.frames,
+        got.lost,
+        sum(got.bad_crc.values()),
+        sum(got.unknown.values()),
+        got.garbage_bytes,
+        station.link.dropped,
+    )

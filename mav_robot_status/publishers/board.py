@@ -1,0 +1,191 @@
+"""The board: the latest status of every handle, as plain values, and what has changed of late. For views to look at.
+
+Entries are the members of a native JSON line, so that a view shows the statuses of its own gateway and those that
+came over a network in the same way. Bounded in handles, transitions and time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from ..clock import rfc3339
+from .json_lines import native_body
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from ..clock import Instant
+    from ..interface import PublisherContext, RobotStatusMsg
+
+MOST_HANDLES: Final = 4096
+MOST_TRANSITIONS: Final = 500
+KEPT: Final = 600.0
+"""Seconds for which transitions are kept: what the bands of a view show."""
+FIELDS: Final = ("mode", "e_stopped", "drives_powered", "motion_possible", "in_motion", "in_error")
+
+
+class Transition(NamedTuple):
+    """One member of one handle's status became another value."""
+
+    at: float
+    """Monotonic seconds of the board's own clock."""
+    stamp: str
+    """The status's own time, RFC 3339."""
+    name: str
+    """A field, `flight_mode`, `link`, `error` or `inhibit`."""
+    value: Any
+    """The new value; of an error or inhibit its name, text and whether it begins."""
+    before: Any = None
+    """The value that it had; None also for UNKNOWN, for the first value, and of an error or inhibit."""
+
+
+class Entry:
+    """The latest of one handle."""
+
+    __slots__ = ("at", "began", "heartbeat_age", "line", "lines", "stamp", "transitions", "version")
+
+    def __init__(self, now: float) -> None:
+        self.began = now
+        """When (monotonic seconds) the first line came."""
+        self.lines = 0
+        """How many lines came."""
+        self.line: Mapping[str, Any] = {}
+        """The members of its latest native line that changed anything; `stamp` and `heartbeat_age` are beside it."""
+        self.stamp = ""
+        self.heartbeat_age: float | None = None
+        self.at = 0.0
+        """When (monotonic seconds) the latest line came."""
+        self.version = 0
+        """That of the board when its latest line changed something."""
+        self.transitions: deque[Transition] = deque(maxlen=MOST_TRANSITIONS)
+
+    def whole(self) -> dict[str, Any]:
+        """The whole line, as `--format native` writes it; `seq` counts the lines that came."""
+        link = {**self.line.get("link", {}), "heartbeat_age": self.heartbeat_age}
+        return {"stamp": self.stamp, "seq": self.lines - 1, **self.line, "link": link}
+
+
+class Board:
+    """All entries by handle. Of one thread: another is handed what is to go on the board."""
+
+    def __init__(self) -> None:
+        self.entries: dict[str, Entry] = {}
+        self.version = 0
+        """Counts the changes of all entries."""
+        self.refused = 0
+        """Lines of handles beyond MOST_HANDLES."""
+        self._seen: dict[str, tuple[Any, Any]] = {}
+
+    def __iter__(self) -> Iterator[Entry]:
+        """The entries by system, component and handle; those without ids last."""
+        return iter(sorted(self.entries.values(), key=_order))
+
+    def take(self, msg: RobotStatusMsg, now: float) -> None:
+        """The newest status of a handle of this process."""
+        entry = self._entry(msg.handle, now)
+        if entry is None:
+            return
+        stamp = rfc3339(msg.unix_us)
+        content = (msg.status, msg.detail)
+        if self._seen.get(msg.handle) != content:
+            self._seen[msg.handle] = content
+            self._change(entry, json.loads("{" + native_body(msg.handle, *content) + "}}"), stamp, now)
+        entry.stamp, entry.at = stamp, now
+        entry.heartbeat_age = None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
+
+    def take_line(self, handle: str, line: Mapping[str, Any], now: float) -> None:
+        """The newest line of a handle of another process, parsed; whatever it holds."""
+        entry = self._entry(handle, now)
+        if entry is None:
+            return
+        stamp = str(line.get("stamp", ""))
+        link = line.get("link")
+        link = link if isinstance(link, dict) else {}
+        rest = {key: value for key, value in line.items() if key not in ("stamp", "seq")}
+        rest["link"] = {key: value for key, value in link.items() if key != "heartbeat_age"}
+        if rest != entry.line:
+            self._change(entry, rest, stamp, now)
+        entry.stamp, entry.at, entry.heartbeat_age = stamp, now, link.get("heartbeat_age")
+
+    def _entry(self, handle: str, now: float) -> Entry | None:
+        entry = self.entries.get(handle)
+        if entry is None:
+            if len(self.entries) >= MOST_HANDLES:
+                self.refused += 1
+                return None
+            entry = self.entries[handle] = Entry(now)
+        entry.lines += 1
+        return entry
+
+    def _change(self, entry: Entry, line: Mapping[str, Any], stamp: str, now: float) -> None:
+        transitions = entry.transitions
+        for name, value, before in _changes(entry.line, line):
+            transitions.append(Transition(now, stamp, name, value, before))
+        while transitions and now - transitions[0].at > KEPT:
+            transitions.popleft()
+        entry.line = line
+        self.version += 1
+        entry.version = self.version
+
+
+class BoardPublisher:
+    """Puts statuses on a board of its own, for a view in the same process. It has no options."""
+
+    periodic = True
+
+    def __init__(self, context: PublisherContext) -> None:
+        self.board = Board()
+        self._waiting: list[RobotStatusMsg] = []
+
+    def busy(self) -> bool:
+        """Never."""
+        return False
+
+    def publish(self, msg: RobotStatusMsg) -> None:
+        """Hold it until `service`, which is called after every round of updates."""
+        self._waiting.append(msg)
+
+    def service(self, now: Instant) -> None:
+        """Put what was published on the board."""
+        for msg in self._waiting:
+            self.board.take(msg, now.mono)
+        self._waiting.clear()
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def _order(entry: Entry) -> tuple[bool, int, int, str]:
+    system, component = entry.line.get("system"), entry.line.get("component")
+    known = isinstance(system, int)
+    return not known, system if isinstance(system, int) else 0, component or 0, str(entry.line.get("handle", ""))
+
+
+def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+    for name in FIELDS:
+        if before.get(name, before) != after.get(name):
+            yield name, after.get(name), before.get(name)
+    for group, name in (("vehicle", "flight_mode"), ("link", "state")):
+        value, old_value = _member(after, group, name), _member(before, group, name)
+        if not before or old_value != value:
+            yield group if group == "link" else name, value, old_value
+    for group, one in (("errors", "error"), ("inhibits", "inhibit")):
+        old, new = _causes(before, group), _causes(after, group)
+        for cause in old.keys() - new.keys():
+            yield one, {**old[cause], "begins": False}, None
+        for cause in new.keys() - old.keys():
+            yield one, {**new[cause], "begins": True}, None
+
+
+def _member(line: Mapping[str, Any], group: str, name: str) -> Any:
+    members = line.get(group)
+    return members.get(name) if isinstance(members, dict) else None
+
+
+def _causes(line: Mapping[str, Any], group: str) -> dict[str, dict[str, Any]]:
+    causes = line.get(group)
+    if not isinstance(causes, list):
+        return {}
+    return {str(c.get("name")): {"name": c.get("name"), "text": c.get("text")} for c in causes if isinstance(c, dict)}

@@ -1,0 +1,523 @@
+"""`doctor` through the installed command: each cause is brought about on a real socket or pseudo-terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import fcntl
+import json
+import os
+import random
+import re
+import socket
+import termios
+import threading
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_robot_status.gateway.doctor.diagnosis import CASES
+from mav_robot_status.mavlink.definitions import Heartbeat, SysStatus, SystemTime
+from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.signing import Signer
+from mav_robot_status.testing import FakeAutopilot, ardurover
+from tests.docs.documents import table
+
+from .gateway_process import run
+
+ROOT = Path(__file__).parents[2]
+LOG = ROOT / "tests" / "recorded" / "logs" / "ardurover-4.5.6-auto.tlog"
+PR_CAPBSET_DROP = 24
+ABSENT = "198.51.100.7"
+"""An address for documentation (RFC 5737), which no computer has."""
+ROVER, COPTER = Heartbeat(0, 10, 3, 65, 4, 3), Heartbeat(0, 2, 3, 81, 3, 3)
+GCS = Heartbeat(0, 6, 8, 192, 4, 3)
+SYS_STATUS = SysStatus(*[1] * len(SysStatus._fields))
+KEY = bytes(range(32))
+
+Make = Callable[[int], list[bytes]]
+
+
+class Source:
+    """Calls `write` with what `make` says, ten times a second, until closed."""
+
+    def __init__(self, write: Callable[[bytes], Any], make: Make) -> None:
+        self._write, self._make = write, make
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        tick = 0
+        while not self._stop.is_set():
+            for data in self._make(tick):
+                with contextlib.suppress(OSError):  # nobody is there yet, or any more
+                    self._write(data)
+            tick += 1
+            self._stop.wait(0.1)
+
+
+@pytest.fixture
+def port() -> int:
+    """A UDP port that nobody has."""
+    return free_port(socket.SOCK_DGRAM)
+
+
+def free_port(kind: socket.SocketKind) -> int:
+    """None of those that the system gives to senders, or another one may get it before it is used."""
+    while True:
+        number = random.randrange(20_000, 30_000)
+        with socket.socket(socket.AF_INET, kind) as any_port, contextlib.suppress(OSError):
+            any_port.bind(("0.0.0.0", number))
+            return number
+
+
+@pytest.fixture
+def send(ended: contextlib.ExitStack, port: int) -> Callable[..., None]:
+    """Send by UDP from an address of its own."""
+
+    def begin(make: Make, to: tuple[str, int] = ("127.0.0.1", port)) -> None:
+        sender = ended.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+        ended.enter_context(contextlib.closing(Source(lambda data: sender.sendto(data, to), make)))
+
+    return begin
+
+
+class Terminal:
+    """A pseudo-terminal: `device` is what the command opens."""
+
+    def __init__(self) -> None:
+        self.master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self.device = os.ttyname(self._slave)
+
+    def write(self, data: bytes) -> None:
+        os.write(self.master, data)
+
+    def baud(self) -> int:
+        """The rate that whoever has the device open has set."""
+        return {getattr(termios, f"B{b}"): b for b in (38400, 57600, 115200)}.get(termios.tcgetattr(self.master)[5], 0)
+
+    def close(self) -> None:
+        os.close(self.master)
+        os.close(self._slave)
+
+
+@pytest.fixture
+def terminal(ended: contextlib.ExitStack) -> Terminal:
+    return ended.enter_context(contextlib.closing(Terminal()))
+
+
+@pytest.fixture
+def server(ended: contextlib.ExitStack) -> socket.socket:
+    """A TCP server that does nothing by itself."""
+    made = ended.enter_context(socket.socket())
+    made.bind(("127.0.0.1", 0))
+    made.listen(0)
+    return made
+
+
+def examined(cause: str, *arguments: str, seconds: float = 0.8, **options: Any) -> dict[str, Any]:
+    """The command's report, which is to name this cause; the exit code says what `ok` says."""
+    done = run("doctor", "-q", "--as-json", "--seconds", str(seconds), *arguments, **options)
+    assert "Traceback" not in done.stderr, done.stderr
+    report: dict[str, Any] = json.loads(done.stdout)
+    assert report["cause"] == cause, report
+    assert done.returncode == (0 if report["ok"] else 1)
+    return report
+
+
+def says(report: dict[str, Any], found: str, then: str) -> None:
+    assert found in report["found"][0]
+    assert then in report["next"]
+
+
+def heed_permissions() -> None:
+    """Even the superuser needs a permission then (capabilities 1 and 2, that override it, are dropped)."""
+    if os.getuid() == 0:
+        for capability in (1, 2):
+            assert ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, capability, 0, 0, 0) == 0
+
+
+def speaking(*messages: Any, version: int = 2, system: int = 1, component: int = 1) -> Make:
+    """These messages again and again, numbered in sequence."""
+
+    def make(tick: int) -> list[bytes]:
+        first = tick * len(messages)
+        return [
+            encode(m, system=system, component=component, sequence=(first + i) % 256, version=version)
+            for i, m in enumerate(messages)
+        ]
+
+    return make
+
+
+def spoilt(make: Make) -> Make:
+    """The same frames, each with a CRC as of another definition."""
+    return lambda tick: [frame[:-1] + bytes([frame[-1] ^ 0x55]) for frame in make(tick)]
+
+
+# -- the link cannot be opened -----------------------------------------------------------------------------------------
+
+
+def test_a_port_that_is_taken_and_by_whom(port: int) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", port))
+        report = examined("port-taken", f"udp:127.0.0.1:{port}")
+    says(report, f"udp port {port} on 127.0.0.1 is taken by ", "stop it or listen on another port")
+    assert f"(pid {os.getpid()})" in report["found"][0]
+
+
+def test_a_device_without_permission(terminal: Terminal) -> None:
+    os.chmod(terminal.device, 0)
+    report = examined("no-permission", terminal.device, preexec_fn=heed_permissions)
+    says(report, f"{terminal.device}: no permission", "its owner")
+
+
+def test_what_is_no_serial_device() -> None:
+    says(examined("cannot-open", "/dev/null"), "/dev/null: not a serial device", "write another connection")
+
+
+# -- nothing comes -----------------------------------------------------------------------------------------------------
+
+
+def test_a_device_that_is_not_there(tmp_path: Path) -> None:
+    report = examined("device-missing", f"serial://{tmp_path}/ttyACM7:57600")
+    says(report, f"there is no {tmp_path}/ttyACM7; serial devices here: ", "")
+
+
+def test_a_device_that_another_program_holds(terminal: Terminal) -> None:
+    with open(terminal.device, "rb", buffering=0) as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        says(examined("device-held", terminal.device), f"{terminal.device} is held by ", "end that program")
+
+
+@pytest.mark.parametrize("kind", ["udp", "tcpin"])
+def test_an_address_that_this_computer_does_not_have(kind: str) -> None:
+    report = examined("no-such-address", f"{kind}:{ABSENT}:14550")
+    says(report, f"this computer has no address {ABSENT}", f"{kind}:0.0.0.0:14550")
+
+
+@pytest.mark.parametrize("kind", ["udpout", "tcp"])
+def test_a_name_that_is_not_known(kind: str) -> None:
+    says(examined("unknown-name", f"{kind}:nowhere.invalid:14550"), "the name nowhere.invalid is not known", "address")
+
+
+def test_a_sender_that_sends_to_another_address_of_this_computer(send: Callable[..., None], port: int) -> None:
+    send(speaking(ROVER))
+    report = examined("elsewhere", f"udp:127.0.0.2:{port}")
+    says(report, f"it does with udp:0.0.0.0:{port}", f"write udp:0.0.0.0:{port}")
+
+
+def test_a_serial_device_at_another_rate(ended: contextlib.ExitStack, terminal: Terminal) -> None:
+    good = speaking(ROVER)
+    make: Make = lambda tick: good(tick) if terminal.baud() == 115200 else [b"\x8c\x03\x9e" * 9]  # noqa: E731
+    ended.enter_context(contextlib.closing(Source(terminal.write, make)))
+    report = examined("elsewhere", f"{terminal.device},57600")
+    says(report, f"it does with {terminal.device},115200", f"write {terminal.device},115200")
+
+
+def test_a_udp_port_that_nobody_sends_to(port: int) -> None:
+    report = examined("udp-silent", f"udp:127.0.0.1:{port}")
+    says(report, f"nothing was sent to UDP port {port}", f"udp:0.0.0.0:{port}")
+
+
+def test_a_passive_sender_is_not_answered(port: int) -> None:
+    says(examined("must-speak", f"udpout:127.0.0.1:{port}", "--passive"), "--passive", "leave --passive away")
+
+
+def test_a_udp_port_that_nobody_listens_on(port: int) -> None:
+    report = examined("udp-refused", f"udpout:127.0.0.1:{port}")
+    says(report, "nothing listens on that UDP port", f"udp:0.0.0.0:{port}")
+
+
+def test_a_udp_peer_that_hears_us_and_does_not_answer() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        peer.settimeout(5)
+        says(examined("no-answer", f"udpout:127.0.0.1:{peer.getsockname()[1]}"), "does not answer", "firewall")
+        heartbeat = peer.recv(300)
+    assert (heartbeat[5], heartbeat[6], int.from_bytes(heartbeat[7:10], "little")) == (245, 192, 0)
+
+
+def test_a_tcp_port_that_nobody_listens_on() -> None:
+    where = f"127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    says(examined("tcp-refused", f"tcp:{where}"), f"{where} refuses the connection", "start the server")
+
+
+def test_a_tcp_server_that_does_not_answer(ended: contextlib.ExitStack, server: socket.socket) -> None:
+    """One whose queue is full drops what comes, as a firewall does."""
+    for _ in range(3):
+        waiting = ended.enter_context(socket.socket())
+        waiting.setblocking(False)
+        waiting.connect_ex(server.getsockname())
+    says(examined("tcp-unreachable", f"tcp:127.0.0.1:{server.getsockname()[1]}"), "timeout", "ping 127.0.0.1")
+
+
+def test_a_tcp_server_that_says_nothing(server: socket.socket) -> None:
+    server.listen(8)
+    says(examined("tcp-silent", f"tcp:127.0.0.1:{server.getsockname()[1]}"), "takes the connection", "MAVLink")
+
+
+def test_a_tcp_server_of_ours_that_nobody_connects_to() -> None:
+    where = f"127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    says(examined("nobody-connects", f"tcpin:{where}"), "nobody connected", f"connect to {where}")
+
+
+def test_a_serial_device_that_is_silent(terminal: Terminal) -> None:
+    report = examined("serial-silent", f"{terminal.device},115200")
+    says(report, f"no byte came from {terminal.device}", "at 115200 baud")
+
+
+# -- bytes come --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("data", "name", "then"),
+    [
+        (b"$M<\x00dd$M<\x00ee", "MSP", "telemetry MAVLINK"),
+        (b"$GPGGA,123519,4807.038,N*47\r\n", "NMEA", "autopilot"),
+        (b"\r\nnsh> \r\nNuttShell (NSH) NuttX-11.0\r\n", "a console's text", "MAVLink"),
+    ],
+)
+def test_another_protocol(ended: contextlib.ExitStack, terminal: Terminal, data: bytes, name: str, then: str) -> None:
+    ended.enter_context(contextlib.closing(Source(terminal.write, lambda _: [data])))
+    says(examined("other-protocol", terminal.device), f"it is {name}", then)
+
+
+def test_bytes_at_a_rate_that_is_none_of_the_usual(ended: contextlib.ExitStack, terminal: Terminal) -> None:
+    ended.enter_context(contextlib.closing(Source(terminal.write, lambda _: [b"\x8c\x03\x9e" * 9])))
+    report = examined("wrong-baud", terminal.device, seconds=0.3)
+    says(report, "no MAVLink, neither at the other usual rates", f"{terminal.device},RATE")
+
+
+def test_bytes_that_are_nothing_known(send: Callable[..., None], port: int) -> None:
+    send(lambda _: [b"\x01\x02\x03\x04" * 20])
+    report = examined("not-mavlink", f"udp:127.0.0.1:{port}")
+    says(report, "they begin with 01 02 03 04", "MAVLink")
+    assert report["garbage_bytes"] == report["bytes"]
+
+
+# -- MAVLink comes -----------------------------------------------------------------------------------------------------
+
+
+def test_a_dialect_that_differs(send: Callable[..., None], port: int) -> None:
+    send(speaking(ROVER))
+    send(spoilt(speaking(SYS_STATUS)))
+    report = examined("other-dialect", f"udp:127.0.0.1:{port}")
+    says(report, "1 SYS_STATUS (", "definitions")
+    assert report["bad_crc"]["1"] >= 3
+
+
+def test_only_a_ground_station_and_a_gimbal(send: Callable[..., None], port: int) -> None:
+    send(speaking(GCS, system=255, component=190))
+    send(speaking(SystemTime(0, 0), component=154))
+    report = examined("no-autopilot", f"udp:127.0.0.1:{port}")
+    says(report, "only 1.154 without a heartbeat, 255.190 GCS", "HEARTBEAT")
+    assert [s["type"] for s in report["speakers"]] == [None, "GCS"]
+
+
+def test_another_vehicle_than_the_one_asked_for(send: Callable[..., None], port: int) -> None:
+    send(speaking(ROVER, SYS_STATUS))
+    report = examined("other-system", f"udp:127.0.0.1:{port}", "--system", "7")
+    says(report, "system 7 is not heard, but 1.1 GROUND_ROVER", "--system 1")
+
+
+def test_two_vehicles_of_different_types_with_one_id(send: Callable[..., None], port: int) -> None:
+    send(speaking(ROVER, SYS_STATUS))
+    send(speaking(COPTER, SYS_STATUS))
+    report = examined("two-vehicles", f"udp:127.0.0.1:{port}")
+    says(report, "ARDUPILOTMEGA QUADROTOR and of ARDUPILOTMEGA GROUND_ROVER", "SYSID_THISMAV")
+    assert not report["ok"]
+
+
+def test_two_vehicles_of_one_type_with_one_id_by_their_clocks(send: Callable[..., None], port: int) -> None:
+    for boot_ms in (10_000, 500_000):
+        send(speaking(ROVER, SYS_STATUS, SystemTime(0, boot_ms)))
+    report = examined("two-vehicles", f"udp:127.0.0.1:{port}")
+    says(report, "clocks in turns that started 490 s apart", "MAV_SYS_ID")
+    assert len(report["sources"]) == 2
+
+
+def test_signed_frames_without_a_key(send: Callable[..., None], port: int) -> None:
+    send(signed(speaking(ROVER, SYS_STATUS)))
+    report = examined("signed", f"udp:127.0.0.1:{port}")
+    says(report, "are signed", "--signing-key FILE")
+    assert report["ok"]
+    assert report["signed"] == report["frames"]
+
+
+@pytest.fixture
+def key_file(tmp_path: Path) -> str:
+    path = tmp_path / "key"
+    path.write_text(KEY.hex())
+    path.chmod(0o600)
+    return str(path)
+
+
+def test_a_vehicle_that_does_not_sign_with_the_key_that_was_given(
+    send: Callable[..., None], port: int, key_file: str
+) -> None:
+    send(speaking(ROVER, SYS_STATUS))
+    report = examined("not-believed", f"udp:127.0.0.1:{port}", "--signing-key", key_file)
+    says(report, "1.1 GROUND_ROVER is not believed: its frames are not signed", "sign with this key")
+
+
+def test_a_vehicle_that_signs_with_the_key_that_was_given(send: Callable[..., None], port: int, key_file: str) -> None:
+    send(signed(speaking(ROVER, SYS_STATUS)))
+    assert examined("ok", f"udp:127.0.0.1:{port}", "--signing-key", key_file)["ok"]
+
+
+def signed(make: Make) -> Make:
+    """The same frames, signed."""
+    signer = Signer(KEY, 1)
+    return lambda tick: [signer.sign(frame, time.time_ns() // 1000) for frame in make(tick)]
+
+
+def test_heartbeats_that_are_too_few(tmp_path: Path) -> None:
+    log = tmp_path / "short.tlog"
+    frames = speaking(ROVER)(0) + speaking(SYS_STATUS)(1) + speaking(SYS_STATUS)(2)
+    stamps = range(1_800_000_000_000_000, 1_800_000_009_000_000, 3_000_000)
+    log.write_bytes(b"".join(at.to_bytes(8, "big") + frame for at, frame in zip(stamps, frames, strict=True)))
+    says(examined("few-heartbeats", str(log)), "1 HEARTBEAT of 1.1 came within 6.0 s", "HEARTBEAT once a second")
+
+
+def test_a_passive_ear_for_a_vehicle_without_sys_status(send: Callable[..., None], port: int) -> None:
+    send(speaking(ROVER))
+    report = examined("no-sys-status", f"udp:127.0.0.1:{port}", "--passive")
+    says(report, "sends no SYS_STATUS; it was not asked for", "leave --passive away")
+
+
+def test_a_vehicle_that_does_not_send_sys_status_although_asked(send: Callable[..., None], port: int) -> None:
+    send(speaking(ROVER))
+    report = examined("no-sys-status", f"udp:127.0.0.1:{port}", seconds=4.2)
+    says(report, "sends no SYS_STATUS, although it was asked for", "SRn_EXT_STAT")
+    assert report["speakers"][0]["rates"]["SYS_STATUS"] == 0
+
+
+# -- a status can be had -----------------------------------------------------------------------------------------------
+
+
+def test_mavlink_1(send: Callable[..., None], port: int) -> None:
+    send(speaking(ROVER, SYS_STATUS, version=1))
+    report = examined("mavlink-1", f"udp:127.0.0.1:{port}")
+    says(report, "1.1 speaks MAVLink 1", "SERIALn_PROTOCOL")
+    assert report["ok"]
+
+
+def test_a_clock_that_is_wrong(send: Callable[..., None], port: int) -> None:
+    send(lambda tick: speaking(ROVER, SYS_STATUS, SystemTime(int((time.time() - 3600) * 1e6), tick * 100))(tick))
+    report = examined("wrong-clock", f"udp:127.0.0.1:{port}")
+    says(report, "differ by 3600 s", "timedatectl")
+    assert report["ok"]
+
+
+def test_all_is_well_and_it_ends_early(port: int, autopilot: Callable[..., FakeAutopilot]) -> None:
+    """A rover that sends nothing but heartbeats until it is asked, as `run` would ask it."""
+    autopilot(ardurover.READY, ("127.0.0.1", port))
+    report = examined("ok", f"udp:127.0.0.1:{port}", seconds=20)
+    says(report, "a status can be had", f"mav-robot-status udp:127.0.0.1:{port}")
+    assert report["ok"]
+    assert 3 <= report["seconds"] < 15
+    (rover,) = report["speakers"]
+    assert (rover["autopilot"], rover["type"]) == ("ARDUPILOTMEGA", "GROUND_ROVER")
+    assert rover["status"]["in_error"] is False
+    assert all(rate != 0 for rate in rover["rates"].values())
+    assert report["loss_percent"] == 0
+
+
+def test_a_vehicle_is_found_by_speaking_first() -> None:
+    with FakeAutopilot(ardurover.READY._replace(streams={1: 4.0})) as waiting:
+        report = examined("ok", f"udpout:127.0.0.1:{waiting.address[1]}", seconds=2)
+    assert report["ok"]
+
+
+def test_a_serial_device_that_is_well(ended: contextlib.ExitStack, terminal: Terminal) -> None:
+    ended.enter_context(contextlib.closing(Source(terminal.write, speaking(ROVER, SYS_STATUS))))
+    assert examined("ok", terminal.device)["garbage_bytes"] == 0
+
+
+def test_a_tcp_server_that_is_well(ended: contextlib.ExitStack, server: socket.socket) -> None:
+    server.listen(8)
+    server.settimeout(10)
+    clients: list[socket.socket] = []
+
+    def write(data: bytes) -> None:
+        if not clients:
+            clients.append(ended.enter_context(server.accept()[0]))
+        clients[0].sendall(data)
+
+    ended.enter_context(contextlib.closing(Source(write, speaking(ROVER, SYS_STATUS))))
+    assert examined("ok", f"tcp:127.0.0.1:{server.getsockname()[1]}", seconds=1)["ok"]
+
+
+# -- the command -------------------------------------------------------------------------------------------------------
+
+
+def test_a_recorded_log() -> None:
+    report = examined("ok", str(LOG))
+    assert (report["frames"], report["seconds"]) == (5031, 96.0)
+    assert report["bytes"] == LOG.stat().st_size
+    assert report["speakers"][0]["status"]["flight_mode"] == "AUTO"
+
+
+def test_each_of_several_connections_has_a_report_and_one_that_is_ill_decides(port: int) -> None:
+    done = run("doctor", "-q", "--seconds", "0.2", "--as-json", str(LOG), f"udpout:127.0.0.1:{port}")
+    assert [json.loads(line)["cause"] for line in done.stdout.splitlines()] == ["ok", "udp-refused"]
+    assert done.returncode == 1
+
+
+def test_the_text_leads_with_the_matter_and_ends_with_what_to_do() -> None:
+    done = run("doctor", "-q", str(LOG))
+    lines = done.stdout.splitlines()
+    assert done.returncode == 0
+    assert lines[0] == f"recorded log {LOG}: a status can be had [ok]"
+    assert all(line.startswith("  ") for line in lines[1:-1])
+    assert lines[-1] == f"next: mav-robot-status {LOG}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "no connection given"),
+        (("nowhere.tlog",), "cannot read the log"),
+        (("udp:127.0.0.1:14550", "udpp:127.0.0.1:1"), "did you mean udp"),
+        (("udp:127.0.0.1:14550", "--seconds", "0"), "'0' is no time to listen"),
+    ],
+)
+def test_a_wrong_question_is_2(arguments: tuple[str, ...], message: str) -> None:
+    done = run("doctor", "-q", *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+
+
+def test_every_cause_is_brought_about_here() -> None:
+    causes = set(re.findall(r'examined\("([\w-]+)"', Path(__file__).read_text("utf-8")))
+    assert causes == {case.cause for case in CASES}
+
+
+# -- the document ------------------------------------------------------------------------------------------------------
+
+
+def test_the_example_of_the_document_is_what_the_command_says() -> None:
+    text = (ROOT / "docs" / "doctor.md").read_text("utf-8")
+    command, *shown = text.partition("```text\n$ mav-robot-status ")[2].partition("```")[0].splitlines()
+    assert shown
+    assert run(*command.split(), "-q", cwd=ROOT).stdout.splitlines() == shown
+
+
+def test_the_causes_of_the_document_in_their_order() -> None:
+    assert table("docs/doctor.md", "cause") == [[case.cause, case.meaning.replace("`", "")] for case in CASES]
+
+
+def test_the_members_of_the_document() -> None:
+    listed = [name for row in table("docs/doctor.md", "member") for name in row[0].split(", ")]
+    assert listed == list(examined("ok", str(LOG)))

@@ -1,0 +1,293 @@
+"""What a link does in the field, done to the installed command: its status goes on, and its memory stays flat."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import random
+import signal
+import socket
+import textwrap
+import threading
+import time
+from collections.abc import Callable
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_robot_status.mavlink.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
+from mav_robot_status.testing import FakeAutopilot, ardurover
+
+from .bridges import Bridge, PtyBridge, TcpClientBridge, TcpServerBridge
+from .gateway_process import Gateway
+from .wire import Wire
+
+LOST, CONNECTED = "LOST", "CONNECTED"
+GROWTH = 5.0  # MB
+HOUR = timedelta(hours=1)
+
+StartGateway = Callable[..., Gateway]
+StartAutopilot = Callable[..., FakeAutopilot]
+OpenWire = Callable[..., Wire]
+
+
+@pytest.fixture
+def bridge(ended: contextlib.ExitStack) -> Callable[[Bridge], Bridge]:
+    """Start a bridge that is ended with the test."""
+
+    def start(made: Bridge) -> Bridge:
+        made.start()
+        ended.callback(made.close)
+        return made
+
+    return start
+
+
+def stamped_in(*hours: str) -> Callable[[dict[str, Any]], bool]:
+    return lambda status: status["stamp"][:13] in hours
+
+
+def about_system_1(armed: bool) -> Callable[[Any], bool]:
+    return lambda message: bool(message.subject_system == 1 and message.drives_powered == armed)
+
+
+def state(name: str) -> Callable[[dict[str, object]], bool]:
+    return lambda status: status["link"]["state"] == name  # type: ignore[index]
+
+
+def goes_on_after_a_cut(gate: Gateway, cable: Bridge, autopilot: StartAutopilot) -> None:
+    """The story of every cut: connected, cut, honestly lost, mended, connected, and right about what is new."""
+    rover = autopilot(ardurover.READY, cable.address)
+    gate.wait_for(lambda s: s["drives_powered"] is False, what="a status")
+    cable.cut()
+    cut = time.monotonic()
+    lost = gate.wait_for(state(LOST), after=cut, what="the loss")
+    assert lost.status["drives_powered"] is None
+    rover.arm()
+    cable.mend()
+    back = gate.wait_for(state(CONNECTED), after=lost.at, timeout=15, what="the return")
+    assert back.status["drives_powered"] is True
+    assert gate.process.poll() is None
+
+
+def test_a_serial_device_that_is_unplugged_and_plugged_in_again(
+    gateway: StartGateway, autopilot: StartAutopilot, bridge: Callable[[Bridge], Bridge], tmp_path: Path
+) -> None:
+    device = tmp_path / "ttyACM0"
+    cable = bridge(PtyBridge(device))
+    gate = gateway(f"{device},115200")
+    goes_on_after_a_cut(gate, cable, autopilot)
+    assert gate.stop() == 0
+
+
+def test_a_serial_device_that_comes_after_the_start(
+    gateway: StartGateway, autopilot: StartAutopilot, bridge: Callable[[Bridge], Bridge], tmp_path: Path
+) -> None:
+    device = tmp_path / "ttyACM0"
+    gate = gateway(f"serial://{device}:57600")
+    gate.wait_for_log(str(device))
+    cable = bridge(PtyBridge(device))
+    autopilot(ardurover.READY, cable.address)
+    gate.wait_for(lambda s: s["drives_powered"] is False)
+    assert gate.stop() == 0
+
+
+def test_a_tcp_server_that_is_killed_and_started_again(
+    gateway: StartGateway, autopilot: StartAutopilot, bridge: Callable[[Bridge], Bridge]
+) -> None:
+    cable = TcpServerBridge()
+    bridge(cable)
+    gate = gateway(f"tcp:127.0.0.1:{cable.port}")
+    goes_on_after_a_cut(gate, cable, autopilot)
+    assert sum("connection refused" in line.lower() for line in gate.log) <= 2  # told once a change, not once a try
+    assert gate.stop() == 0
+
+
+def test_a_tcp_client_that_goes_and_comes_back(
+    gateway: StartGateway, autopilot: StartAutopilot, bridge: Callable[[Bridge], Bridge]
+) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    gate = gateway(f"tcpin:127.0.0.1:{port}")
+    gate.wait_for_log("listening on")
+    goes_on_after_a_cut(gate, bridge(TcpClientBridge(port)), autopilot)
+    assert gate.stop() == 0
+
+
+def test_a_udp_peer_that_changes_its_port(gateway: StartGateway, wire: OpenWire) -> None:
+    gate = gateway("udpin:127.0.0.1:0")
+    before = wire(gate.address).beating()
+    gate.wait_for(lambda s: s["drives_powered"] is False)
+    before.close()
+    moved = wire(gate.address)
+    moved.armed = True
+    moved.beating()
+    line = gate.wait_for(lambda s: s["drives_powered"] is True)
+    assert not any(one.status["link"]["state"] == LOST for one in gate.lines)
+    moved.wait_for("ROBOT_STATUS", after=line.at)
+    assert gate.stop() == 0
+
+
+def test_datagrams_truncated_duplicated_and_out_of_order(gateway: StartGateway, wire: OpenWire) -> None:
+    gate = gateway("udpin:127.0.0.1:0")
+    rover = wire(gate.address)
+    rng = random.Random(4)
+    waiting: list[bytes] = []
+    for number in range(2000):
+        message = MAVLink_heartbeat_message(10, 3, 65, number % 5, 4, 3)
+        waiting.append(message.pack(rover.mav))
+        if len(waiting) == 4:
+            rng.shuffle(waiting)
+            for data in waiting:
+                rover.send(data[: rng.randrange(len(data))])
+                rover.send(data)
+                rover.send(data)
+            waiting.clear()
+    sent = rover.beating().beat(armed=True)
+    gate.wait_for(lambda s: s["drives_powered"] is True, after=sent)
+    vehicles = {(line.status["system"], line.status["component"]) for line in gate.lines}
+    assert vehicles == {(1, 1)}
+    assert gate.stop() == 0
+
+
+def test_a_hundred_megabytes_of_random_bytes_leave_the_memory_flat(gateway: StartGateway) -> None:
+    noise = random.Random(5).randbytes(1 << 20)
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        server.listen()
+        gate = gateway(f"tcp:127.0.0.1:{server.getsockname()[1]}")
+        client, _ = server.accept()
+        with client:
+            mav = MAVLink(None, srcSystem=1, srcComponent=1)
+            heartbeat = MAVLink_heartbeat_message(10, 3, 65, 0, 4, 3)
+            client.sendall(noise[:200_000] + bytes(300) + heartbeat.pack(mav))
+            gate.wait_for(lambda s: s["drives_powered"] is False)
+            before = gate.memory()
+            for number in range(100):
+                client.sendall(noise[number:] + noise[:number])
+            sent = time.monotonic()
+            heartbeat = MAVLink_heartbeat_message(10, 3, 65 | 128, 0, 4, 3)
+            client.sendall(bytes(300) + heartbeat.pack(mav))
+            gate.wait_for(lambda s: s["drives_powered"] is True, after=sent, timeout=30)
+            assert gate.memory() - before < GROWTH
+    assert gate.stop() == 0
+    assert any("bytes of garbage" in line for line in gate.log)
+
+
+def test_a_flood_from_a_stranger_neither_hides_the_vehicle_nor_makes_it_grow(
+    gateway: StartGateway, wire: OpenWire
+) -> None:
+    gate = gateway("udpin:127.0.0.1:0", "--json", "none")
+    rover = wire(gate.address).beating()
+    rover.wait_for("ROBOT_STATUS")
+    stranger = MAVLink(None, srcSystem=77, srcComponent=1)
+    frames = [MAVLink_heartbeat_message(10, 3, 65, 0, 4, 3).pack(stranger)]
+    frames += [MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(stranger) for _ in range(30)]
+    datagram = b"".join(frames)
+    stop = threading.Event()
+    count = 0
+
+    def flood() -> None:
+        nonlocal count
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.connect(gate.address)
+            start = time.monotonic()
+            while not stop.wait(max(0.0, start + count / 50_000 - time.monotonic())):
+                with contextlib.suppress(OSError):
+                    sender.send(datagram)
+                count += len(frames)
+
+    thread = threading.Thread(target=flood)
+    started = time.monotonic()
+    thread.start()
+    try:
+        rover.wait_for("ROBOT_STATUS", lambda m: m.subject_system == 77)  # it is a vehicle for all we know
+        before = gate.memory()
+        for armed in (True, False, True):
+            sent = rover.beat(armed=armed)
+            rover.wait_for("ROBOT_STATUS", about_system_1(armed), after=sent)
+        rover.wait_for("HEARTBEAT", after=started + 4.0)
+        assert gate.memory() - before < GROWTH
+    finally:
+        stop.set()
+        thread.join()
+    assert count / (time.monotonic() - started) > 40_000
+    assert gate.stop() == 0
+
+
+def test_255_systems_at_once_each_have_a_status(gateway: StartGateway, wire: OpenWire) -> None:
+    gate = gateway("udpin:127.0.0.1:0", "--changes-only")
+    mav = MAVLink(None)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for _ in range(2):
+            for system in range(1, 256):
+                mav.srcSystem, mav.srcComponent = system, 1
+                sender.sendto(MAVLink_heartbeat_message(10, 3, 65, 0, 4, 3).pack(mav), gate.address)
+        gate.wait_for(lambda s: len({line.status["system"] for line in gate.lines}) == 255, what="255 systems")
+    assert gate.memory() < 60
+    assert gate.stop() == 0
+
+
+STEPPED = """
+    import os, time
+    offset, unstepped = os.environ["OFFSET_FILE"], time.time_ns
+    def time_ns():
+        try:
+            return unstepped() + int(open(offset).read()) * 10**9
+        except (OSError, ValueError):
+            return unstepped()
+    time.time_ns = time_ns
+"""
+
+
+@pytest.fixture
+def offset_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The seconds by which the wall clock of the command is wrong: its Python loads this at its start."""
+    (tmp_path / "sitecustomize.py").write_text(textwrap.dedent(STEPPED))
+    offset = tmp_path / "offset"
+    monkeypatch.setenv("OFFSET_FILE", str(offset))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    return offset
+
+
+def test_a_clock_that_is_stepped_by_hours_changes_stamps_and_nothing_else(
+    gateway: StartGateway, wire: OpenWire, offset_file: Path
+) -> None:
+    offset_file.write_text("0")
+    gate = gateway("udpin:127.0.0.1:0")
+    rover = wire(gate.address).beating()
+    gate.wait_for(lambda s: s["drives_powered"] is False)
+    for hours in (5, -7):
+        offset_file.write_text(str(hours * 3600))
+        shown = datetime.fromtimestamp(time.time() + hours * 3600, timezone.utc)
+        stepped = gate.wait_for(stamped_in(f"{shown:%Y-%m-%dT%H}", f"{shown + HOUR:%Y-%m-%dT%H}"))
+        gate.wait_for(lambda s: True, after=stepped.at + 4.0)  # longer than a link may be silent
+    arrivals = [line.at for line in gate.lines]
+    assert max(b - a for a, b in itertools.pairwise(arrivals)) < 1.0
+    assert not any(line.status["link"]["state"] == LOST for line in gate.lines)
+    sent = rover.beat(armed=True)
+    gate.wait_for(lambda s: s["drives_powered"] is True, after=sent)
+    assert gate.stop() == 0
+
+
+def test_a_process_that_was_stopped_for_ten_seconds_goes_on_with_what_is_so_now(
+    gateway: StartGateway, wire: OpenWire
+) -> None:
+    gate = gateway("udpin:127.0.0.1:0")
+    rover = wire(gate.address).beating()
+    gate.wait_for(lambda s: s["drives_powered"] is False)
+    gate.process.send_signal(signal.SIGSTOP)
+    stopped = time.monotonic()
+    rover.armed = True
+    while len(rover.beats) < 2 or rover.beats[-1] < stopped + 10.0:
+        time.sleep(0.1)
+    resumed = time.monotonic()
+    os.kill(gate.process.pid, signal.SIGCONT)
+    gate.wait_for(lambda s: s["drives_powered"] is True, after=resumed)
+    late = [line for line in gate.lines if resumed < line.at < resumed + 1.0]
+    assert len(late) < 40  # the lines that fell due meanwhile are not made up for
+    assert gate.stop() == 0

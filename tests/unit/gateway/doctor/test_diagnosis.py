@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+import dataclasses
+import errno
+import os
+from typing import Any
+
+import pytest
+
+from mav_robot_status.gateway.doctor.advice import protocol
+from mav_robot_status.gateway.doctor.diagnosis import CASES, diagnose
+from mav_robot_status.gateway.doctor.findings import Findings, Place, Speaker, Trouble, VehicleStatus
+from mav_robot_status.gateway.doctor.report import as_text, remarks
+from mav_robot_status.hardware.requests import COMMON
+from mav_robot_status.link.url import parse
+from mav_robot_status.mavlink.framing import Counters
+
+STATUS = VehicleStatus("HOLD", {"mode": "MANUAL", "in_error": None, "in_motion": False}, (), ("DISARMED",), COMMON)
+ROVER = Speaker(1, 1, 3, 10, {0: 5, 1: 5, 33: 1}, {0: 1.0, 1: 1.0}, 11, pilot=True, status=STATUS)
+GCS = Speaker(255, 190, 8, 6, {0: 5}, {0: 1.0}, 5)
+MUTE = ROVER._replace(counts={0: 5})
+SERIAL, OUT, TCP = "/dev/ttyX,57600", "udpout:h:1", "tcp:h:1"
+
+
+def found(connection: str = "udp:127.0.0.1:14550", **changes: Any) -> Findings:
+    url = parse(connection)
+    return dataclasses.replace(Findings(url, url.words(), seconds=5.0), **changes)
+
+
+def heard(*speakers: Speaker, connection: str = "udp:127.0.0.1:14550", **changes: Any) -> Findings:
+    frames = sum(s.frames for s in speakers)
+    base = {"size": 100, "counters": Counters(frames=frames), "speakers": speakers, "good": {0: 5}}
+    return found(connection, **{**base, **changes})
+
+
+HERE = Place(addresses=("10.0.0.2", "192.168.1.3"))
+TWO_DEVICES = Place("missing", devices=("/dev/ttyACM0", "/dev/ttyUSB0"))
+
+# findings, cause, what is in the matter, what is in what to do
+DIAGNOSES = [
+    (found(trouble=Trouble("port is taken; stop it", errno.EADDRINUSE)), "port-taken", "port is taken", "stop it"),
+    (found(trouble=Trouble("no", errno.EACCES)), "no-permission", "no", "let its owner permit it"),
+    (found(trouble=Trouble("odd")), "cannot-open", "odd", "write another connection"),
+    (found(SERIAL, place=Place("missing")), "device-missing", "here: none", "plug it in"),
+    (found(SERIAL, place=TWO_DEVICES), "device-missing", "/dev/ttyACM0, /dev/ttyUSB0", "one of those"),
+    (found(SERIAL, place=Place("missing", devices=("/dev/ttyACM0",))), "device-missing", "", "write /dev/ttyACM0"),
+    (found(SERIAL, place=Place(holder="mavproxy.py (pid 7)")), "device-held", "held by mavproxy.py (pid 7)", "end"),
+    (found(place=HERE), "udp-silent", "UDP port 14550 within 5.0 s", "udp:0.0.0.0:14550"),
+    (found("udp:0.0.0.0:1", place=HERE), "udp-silent", "", "send to 10.0.0.2:1 or 192.168.1.3:1"),
+    (found("udp:10.0.0.2:1", place=HERE), "udp-silent", "", "send to 10.0.0.2:1, and let this computer's firewall"),
+    (found("udp:[::1]:1"), "udp-silent", "", "send to [::1]:1"),
+    (found("udpout:[fe80::1]:7"), "no-answer", "[fe80::1]:7 does not answer", "udp:0.0.0.0:7"),
+    (found("udpbcast:10.0.0.255:7"), "no-answer", "", "firewall"),
+    (found("udpbcast:10.0.0.255:7", passive=True), "must-speak", "", "leave --passive away"),
+    (found(OUT, place=Place("refused")), "udp-refused", "h:1 refuses", "start"),
+    (found(TCP, place=Place("unreachable")), "tcp-unreachable", "unreachable", "ping h"),
+    (found(TCP, passive=True), "tcp-silent", "", "MAVLink"),
+    (found("tcpin:0.0.0.0:5", place=HERE), "nobody-connects", "", "connect to 10.0.0.2:5 or 192.168.1.3:5"),
+    (found("tcpin:0.0.0.0:5", place=Place()), "nobody-connects", "", "connect to 0.0.0.0:5"),
+    (found(SERIAL, size=9, head=b"\x80" * 9), "wrong-baud", "9 bytes came at 57600", "/dev/ttyX,RATE"),
+    (found(size=9, head=b"\x80" * 9), "not-mavlink", "they begin with 80 80", "plain MAVLink"),
+    (found(SERIAL, size=9, counters=Counters(bad_crc={0: 3})), "other-dialect", "0 HEARTBEAT (3 times)", "definitions"),
+    (heard(GCS), "no-autopilot", "only 255.190 GCS", "HEARTBEAT"),
+    (heard(ROVER._replace(status=None), GCS, expected=(2, 3)), "other-system", "system 2, 3 is not", "--system 1"),
+    (heard(ROVER._replace(status=None), signing=True), "not-believed", "are not signed", "sign with this key"),
+    (
+        *(heard(ROVER._replace(status=None), signing=True, counters=Counters(frames=11, signed=11)), "not-believed"),
+        *("with another key", "the vehicle's own key"),
+    ),
+    (heard(ROVER._replace(twins="so it is")), "two-vehicles", "speak as 1.1: so it is", "MAV_SYSID"),
+    (heard(MUTE, counters=Counters(frames=11, signed=9)), "signed", "9 of 11 frames are signed", "--signing-key"),
+    (heard(ROVER._replace(counts={0: 1, 1: 1})), "few-heartbeats", "1 HEARTBEAT of 1.1", "once a second"),
+    (
+        *(heard(ROVER._replace(counts={0: 1}), counters=Counters(frames=10, lost=90)), "few-heartbeats"),
+        *("", "mend the link first: 90 %"),
+    ),
+    (heard(MUTE, asked=True), "no-sys-status", "although it was asked for", "SRn_EXT_STAT"),
+    (heard(MUTE, passive=True), "no-sys-status", "it was not asked for", "leave --passive away"),
+    (heard(MUTE, passive=True, connection="a.tlog"), "no-sys-status", "", "SRn_EXT_STAT"),
+    (heard(MUTE._replace(autopilot=12)), "no-sys-status", "", "mavlink stream"),
+    (heard(MUTE._replace(autopilot=0)), "no-sys-status", "", "let the autopilot send SYS_STATUS"),
+    (heard(ROVER, MUTE._replace(system=2)), "no-sys-status", "vehicle 2.1", ""),
+    (heard(ROVER._replace(frames_v1=11)), "mavlink-1", "1.1 speaks MAVLink 1", "SERIALn_PROTOCOL"),
+    (heard(ROVER._replace(frames_v1=11, autopilot=12)), "mavlink-1", "", "MAV_PROTO_VER"),
+    (heard(ROVER._replace(clock_off=-7200.0)), "wrong-clock", "differ by 7200 s", "timedatectl"),
+    (heard(ROVER._replace(clock_off=-7200.0), connection="a.tlog"), "ok", "", "mav-robot-status a.tlog"),
+    (heard(ROVER._replace(clock_off=2.0), passive=True), "ok", "a status can be had", "udp:127.0.0.1:14550 --passive"),
+    (heard(ROVER, GCS, counters=Counters(frames=16, signed=16), signing=True), "ok", "", ""),
+]
+BELIEVED = {"signed", "mavlink-1", "wrong-clock", "ok"}
+"""Causes with which the vehicle of these tests has a status."""
+
+
+@pytest.mark.parametrize(("findings", "cause", "matter", "then"), DIAGNOSES, ids=[row[1] for row in DIAGNOSES])
+def test_each_case_has_its_cause_and_one_thing_to_do(findings: Findings, cause: str, matter: str, then: str) -> None:
+    diagnosis = diagnose(findings)
+    assert diagnosis.cause == cause
+    assert matter in diagnosis.matter
+    assert then in diagnosis.next
+    assert all(text and "\n" not in text for text in (diagnosis.matter, diagnosis.next))
+
+
+@pytest.mark.parametrize(("findings", "cause"), [row[:2] for row in DIAGNOSES], ids=[row[1] for row in DIAGNOSES])
+def test_a_status_can_be_had_where_heartbeats_and_sys_status_come(findings: Findings, cause: str) -> None:
+    can = cause in BELIEVED and all(1 in s.counts for s in findings.vehicles)
+    assert diagnose(findings).ok is can
+
+
+def test_a_message_that_is_defined_otherwise_but_not_needed_does_not_hide_that_all_is_well() -> None:
+    bad = {230: 40, 1: 2}  # of SYS_STATUS two of many: noise
+    f = heard(ROVER, good={0: 5, 1: 5}, counters=Counters(frames=11, bad_crc=bad))
+    assert diagnose(f).cause == "ok"
+    assert "bad CRC: 1 SYS_STATUS (2 times), 230 (40 times)" in remarks(f)
+
+
+def test_a_status_that_can_be_had_although_a_message_is_defined_otherwise() -> None:
+    f = heard(ROVER, counters=Counters(frames=11, bad_crc={30: 40}))
+    assert diagnose(f)[:2] == ("other-dialect", True)
+
+
+def test_two_vehicles_with_one_id_are_not_to_be_believed() -> None:
+    assert not diagnose(heard(ROVER._replace(twins="so it is"))).ok
+
+
+def test_the_causes_are_told_apart_and_the_last_always_applies() -> None:
+    assert len({case.cause for case in CASES}) == len(CASES)
+    assert [case.cause for case in CASES if case.applies(found("a.tlog"))][-1] == "ok"
+
+
+@pytest.mark.parametrize(
+    ("head", "name"),
+    [
+        (b"\x00\x17$M>\x05", "MSP"),
+        (b"$X<\x00\x64", "MSP"),
+        (b"1,A*7F\r\n$GNGGA,0", "NMEA"),
+        (b"\xb5\x62\x01\x07\x5c\x00", "u-blox"),
+        (b"$TA\x01\x02", "LTM"),
+        (b"SSH-2.0-OpenSSH_9.6\r\n", "SSH"),
+        (b"HTTP/1.1 400 Bad Request\r\n", "HTTP"),
+        (b"\r\nU-Boot 2024.01\r\nHit any key", "a console's text"),
+    ],
+)
+def test_other_protocols_are_recognised(head: bytes, name: str) -> None:
+    known = protocol(head)
+    assert known is not None
+    assert known.name == name
+
+
+def test_noise_and_too_little_text_are_not_taken_for_a_protocol() -> None:
+    assert protocol(b"hello") is None
+    assert sum(protocol(os.urandom(40)) is not None for _ in range(1000)) < 5
+
+
+def test_a_vehicle_is_described_with_what_does_not_come() -> None:
+    lines = list(remarks(heard(ROVER, GCS)))
+    assert "vehicle 1.1: ARDUPILOTMEGA, GROUND_ROVER, flight mode HOLD" in lines
+    assert "rates: HEARTBEAT 1 Hz, SYS_STATUS 1 Hz, GLOBAL_POSITION_INT once" in lines
+    assert "does not come: EXTENDED_SYS_STATE, ATTITUDE, SYSTEM_TIME" in lines
+    assert "status: mode MANUAL, in_error UNKNOWN, in_motion FALSE" in lines
+    assert "also heard: 255.190 GCS" in lines
+
+
+def test_what_stands_in_for_a_message_counts_for_it() -> None:
+    assert ROVER._replace(counts={32: 9}, rates={32: 4.0}).wanted["LOCAL_POSITION_NED"] == 4.0
+
+
+def test_px4_without_a_ground_station_says_that_there_are_no_texts() -> None:
+    px4 = ROVER._replace(autopilot=12)
+    assert any("PX4 sends texts only" in line for line in remarks(heard(px4)))
+    assert not any("PX4 sends texts only" in line for line in remarks(heard(px4, GCS)))
+
+
+def test_the_text_names_a_few_of_many_addresses() -> None:
+    f = heard(ROVER, sources=tuple(f"10.0.0.{i}:5" for i in range(9)))
+    assert "from 10.0.0.0:5, 10.0.0.1:5, 10.0.0.2:5, 10.0.0.3:5, ...;" in as_text(f, diagnose(f))

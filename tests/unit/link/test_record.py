@@ -1,0 +1,584 @@
+"""Recording: the file is one that others open, and whatever befalls the disk befalls nothing else.
+
+The disks that stall and refuse are real: the writer's descriptor is made to lead to a pipe that nobody reads, or to
+/dev/full, or a child process may write no larger files.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import logging
+import os
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import textwrap
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mav_robot_status.errors import LinkError, UsageError
+from mav_robot_status.gateway.recorded import Recording
+from mav_robot_status.link import record
+from mav_robot_status.link.record import MOST_WAITING, TlogWriter
+from mav_robot_status.link.tlog_file import LONGEST, TAIL
+from mav_robot_status.mavlink import definitions as mav
+from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.framing import Frame, Parser
+
+START = 1_700_000_000_000_000
+LOGS = sorted((Path(__file__).parents[2] / "recorded" / "logs").glob("*.tlog"))
+TIME_OUT = 20.0
+"""Seconds after which something that must happen has not."""
+
+
+def frame(number: int, version: int = 2) -> bytes:
+    return encode(mav.Heartbeat(number, 10, 3, 81, 4, 3), system=1, component=1, sequence=number % 256, version=version)
+
+
+def signed(number: int) -> bytes:
+    """As long as a signed frame and flagged as one; whether the signature is right is no matter of the file."""
+    plain = frame(number)
+    return plain[:2] + b"\1" + plain[3:] + bytes(range(13))
+
+
+def stamped(number: int, data: bytes | None = None) -> bytes:
+    return (START + number).to_bytes(8, "big") + (frame(number) if data is None else data)
+
+
+def write(path: Path, *numbers: int) -> None:
+    writer = TlogWriter(str(path))
+    for number in numbers:
+        writer.write(START + number, frame(number))
+    writer.close()
+    assert writer.dropped == 0
+
+
+def numbers(path: Path) -> list[int]:
+    return [int.from_bytes(it.what.payload[:4], "little") for it in Recording(str(path)) if it.what is not None]
+
+
+def frames_of(path: Path) -> list[Frame]:
+    return Parser(None, 8).feed(path.read_bytes())
+
+
+@pytest.fixture(name="flight")
+def fixture_flight(tmp_path: Path) -> Path:
+    return tmp_path / "flight.tlog"
+
+
+@pytest.fixture(name="lines")
+def fixture_lines() -> Iterator[queue.Queue[str]]:
+    """What the log says, to wait for."""
+    lines: queue.Queue[str] = queue.Queue()
+
+    class Handler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            lines.put(record.getMessage())
+
+    handler = Handler()
+    record.log.addHandler(handler)
+    yield lines
+    record.log.removeHandler(handler)
+
+
+class Led:
+    """The descriptor with which this process writes a file, led elsewhere."""
+
+    def __init__(self, path: Path, elsewhere: int) -> None:
+        links = Path("/proc/self/fd")
+        [self._descriptor] = [int(n) for n in os.listdir(links) if os.path.realpath(links / n) == str(path.resolve())]
+        self._file = os.dup(self._descriptor)
+        os.dup2(elsewhere, self._descriptor)
+        os.close(elsewhere)
+
+    def back(self) -> None:
+        os.dup2(self._file, self._descriptor)
+        self.forget()
+
+    def forget(self) -> None:
+        """Let go of the file, and so of its lock."""
+        os.close(self._file)
+
+
+def in_time(act: Callable[[], None]) -> None:
+    """Does it in a thread, so that it fails if it blocks."""
+    thread = threading.Thread(target=act, daemon=True)
+    thread.start()
+    thread.join(TIME_OUT)
+    assert not thread.is_alive()
+
+
+def test_a_record_is_eight_bytes_of_time_and_the_frame(flight: Path) -> None:
+    writer = TlogWriter(str(flight))
+    writer.write(0x0102030405060708, b"\xfe\0\0\1\1\0\xaa\xbb")
+    writer.close()
+    assert flight.read_bytes() == bytes.fromhex("0102030405060708 fe00000101 00 aabb")
+
+
+def test_what_is_written_is_read_by_our_own_reader(flight: Path) -> None:
+    writer = TlogWriter(str(flight))
+    for number in range(300):
+        writer.write(START + number, frame(number, 1 + number % 2))
+    writer.close()
+    found = [it for it in Recording(str(flight)) if it.what is not None]
+    assert [it.now.unix_us - START for it in found] == list(range(300))
+    assert [it.what.payload[:2] for it in found] == [n.to_bytes(2, "little") for n in range(300)]
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_a_real_log_recorded_again_is_the_same_file(log: Path, flight: Path) -> None:
+    writer = TlogWriter(str(flight))
+    for it in frames_of(log):
+        writer.write(int.from_bytes(it.stamp, "big"), it.raw)
+    writer.close()
+    assert writer.dropped == 0
+    assert flight.read_bytes() == log.read_bytes()
+
+
+def test_pymavlink_reads_every_frame_with_its_time(flight: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MAVLINK20", "1")
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    frames = [frame(number, 1 + number % 2) for number in range(300)]
+    writer = TlogWriter(str(flight))
+    for number, data in enumerate(frames):
+        writer.write(START + number, data)
+    writer.close()
+    log = mavutil.mavlink_connection(str(flight))
+    found = list(iter(log.recv_msg, None))
+    log.close()
+    assert [bytes(message.get_msgbuf()) for message in found] == frames
+    assert [round(message._timestamp * 1e6) - START for message in found] == list(range(300))
+
+
+FRAMES = st.one_of(
+    st.builds(lambda body: b"\xfe" + bytes([len(body) - 6]) + body, st.binary(min_size=6, max_size=261)),
+    st.builds(
+        lambda flags, body: b"\xfd" + bytes([len(body) - (22 if flags & 1 else 9), flags]) + body,
+        st.integers(0, 255),
+        st.binary(min_size=22, max_size=264),
+    ),
+)
+
+
+@settings(max_examples=50, deadline=None)  # it waits for a disk and a thread
+@given(st.lists(st.tuples(st.integers(0, (1 << 52) - 1), FRAMES), min_size=1, max_size=20), st.data())
+def test_any_frames_are_in_the_file_as_they_were_and_appended_to_after_a_crash(
+    pieces: list[tuple[int, bytes]], data: st.DataObject
+) -> None:
+    records = [stamp.to_bytes(8, "big") + raw for stamp, raw in pieces]
+    cut = data.draw(st.integers(1, len(records[-1]) - 1))
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "flight.tlog")
+        for _ in range(2):
+            writer = TlogWriter(path)
+            for stamp, raw in pieces:
+                writer.write(stamp, raw)
+            writer.close()
+            os.truncate(path, os.path.getsize(path) - cut)  # a crash
+        assert Path(path).read_bytes() == b"".join(records[:-1]) + b"".join(records)[:-cut]
+
+
+@pytest.mark.parametrize("last", [frame(9, 1), frame(9, 2), signed(9)], ids=["v1", "v2", "signed"])
+@pytest.mark.parametrize("before", [0, 3, 3000], ids=lambda count: f"after {count} records")
+def test_a_torn_tail_of_every_length_is_cut_off(flight: Path, before: int, last: bytes) -> None:
+    whole = b"".join(stamped(number) for number in range(before))
+    assert before < 3000 or len(whole) > TAIL
+    torn = stamped(9, last)
+    for length in range(len(torn)):
+        flight.write_bytes(whole + torn[:length])
+        TlogWriter(str(flight)).close()
+        assert flight.read_bytes() == whole, length
+    flight.write_bytes(whole + torn)
+    TlogWriter(str(flight)).close()
+    assert flight.read_bytes() == whole + torn
+
+
+def test_a_torn_frame_that_carries_records_itself_is_cut_off_all_the_same(flight: Path) -> None:
+    carrier = b"\xfd\xff\0\0\0\1\1\x81\1\0" + stamped(1) * 9
+    flight.write_bytes(stamped(0) + stamped(1, carrier[:200]))
+    TlogWriter(str(flight)).close()
+    assert flight.read_bytes() == stamped(0)
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_a_real_log_torn_anywhere_is_cut_to_its_last_whole_record(log: Path, flight: Path) -> None:
+    content = log.read_bytes()
+    ends = list(itertools.accumulate(8 + len(it.raw) for it in frames_of(log)))
+    assert ends[-1] == len(content)
+    middle = len(content) // 2
+    for cut in range(middle, middle + 100, 3):
+        flight.write_bytes(content[:cut])
+        TlogWriter(str(flight)).close()
+        assert flight.stat().st_size == max(end for end in ends if end <= cut)
+
+
+def test_the_person_is_told_of_a_torn_record(flight: Path, caplog: pytest.LogCaptureFixture) -> None:
+    flight.write_bytes(stamped(0) + stamped(1)[:10])
+    with caplog.at_level(logging.INFO):
+        write(flight, 1)
+    assert caplog.messages == [f"{flight} ended in a torn record: 10 bytes were cut off"]
+    assert numbers(flight) == [0, 1]
+
+
+@pytest.mark.parametrize("zeros", [1, 500, 3 * TAIL])
+@pytest.mark.parametrize("kept", [0, 5, 8])
+def test_zeros_that_a_power_cut_left_are_cut_off(flight: Path, zeros: int, kept: int) -> None:
+    flight.write_bytes(stamped(0) + stamped(1)[:kept] + bytes(zeros))
+    write(flight, 2)
+    assert flight.read_bytes() == stamped(0) + stamped(2)
+
+
+@pytest.mark.parametrize("zeros", [1, 9, 2 * TAIL])
+def test_a_file_of_nothing_but_zeros_is_begun_anew(flight: Path, zeros: int) -> None:
+    flight.write_bytes(bytes(zeros))
+    write(flight, 0)
+    assert flight.read_bytes() == stamped(0)
+
+
+def test_what_others_wrote_behind_the_records_stays(flight: Path) -> None:
+    foreign = stamped(0) + b"x" * LONGEST
+    flight.write_bytes(foreign)
+    write(flight, 1)
+    assert flight.read_bytes() == foreign + stamped(1)
+    assert numbers(flight) == [0, 1]
+
+
+def test_garbage_among_the_records_does_not_hide_the_last_one(flight: Path) -> None:
+    content = stamped(0) + (START + 1).to_bytes(8, "big") + b"garbage\xfe\xfd\xfd" + stamped(2)
+    flight.write_bytes(content + stamped(3)[:12])
+    TlogWriter(str(flight)).close()
+    assert flight.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"a", b"flight report\n", b"\x7fELF" + bytes(4096), bytes(100) + b"x", frame(0) * 3, b"x" * 2 * TAIL],
+    ids=["one byte", "text", "program", "zeros and more", "frames without time", "long"],
+)  # fmt: skip
+def test_a_file_that_is_no_recorded_log_is_left_alone(flight: Path, content: bytes) -> None:
+    flight.write_bytes(content)
+    with pytest.raises(UsageError) as raised:
+        TlogWriter(str(flight))
+    assert str(raised.value) == f"{str(flight)!r} does not begin as a recorded log does; record to another file"
+    assert flight.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "line"),
+    [
+        ("flight.bin", UsageError, "the name must end in .tlog; write for example flight.tlog"),
+        ("udp:127.0.0.1:14550", UsageError, "the name must end in .tlog; write for example flight.tlog"),
+        ("a\0b.tlog", UsageError, "not a file name; write for example flight.tlog"),
+        ("none/flight.tlog", LinkError, "there is no folder '{folder}/none'; make it, or record elsewhere"),
+        ("folder.tlog", UsageError, "it is no file; write for example flight.tlog"),
+        ("full.tlog", UsageError, "it is no file; write for example flight.tlog"),
+        ("file/flight.tlog", LinkError, "Not a directory; record elsewhere"),
+    ],
+)
+def test_a_path_that_cannot_be_recorded_to_is_said_in_one_line(
+    tmp_path: Path, name: str, kind: type[Exception], line: str
+) -> None:
+    (tmp_path / "folder.tlog").mkdir()
+    (tmp_path / "full.tlog").symlink_to("/dev/full")
+    (tmp_path / "file").touch()
+    path = f"{tmp_path}/{name}"
+    with pytest.raises(kind) as raised:
+        TlogWriter(path)
+    assert str(raised.value) == f"cannot record to {path!r}: {line.format(folder=tmp_path)}"
+
+
+def test_a_folder_without_permission_is_said_in_one_line() -> None:
+    """Not even root may write there; in a container it is read-only besides."""
+    with pytest.raises(LinkError, match=r"'/sys/flight.tlog': (no permission|Read-only file system); record "):
+        TlogWriter("/sys/flight.tlog")
+
+
+def test_two_programs_do_not_record_to_one_file(flight: Path) -> None:
+    writer = TlogWriter(str(flight))
+    with pytest.raises(LinkError, match="another program is recording to it; record to another file"):
+        TlogWriter(str(flight))
+    writer.close()
+    TlogWriter(str(flight)).close()
+
+
+def test_frames_reach_the_system_within_a_second(flight: Path) -> None:
+    writer = TlogWriter(str(flight))
+    read, pipe = os.pipe()
+    led = Led(flight, pipe)
+    received: queue.Queue[bytes] = queue.Queue()
+    reader = threading.Thread(target=lambda: received.put(os.read(read, 4096)), daemon=True)
+    reader.start()
+    writer.write(START, frame(0))
+    assert received.get(timeout=2.0) == stamped(0)  # one second is for a busy machine
+    led.back()
+    writer.close()
+    os.close(read)
+
+
+def test_a_full_file_makes_room_for_a_new_one_and_no_frame_is_lost(flight: Path) -> None:
+    size = len(stamped(0))
+    most = 100 * size + 5
+    writer = TlogWriter(str(flight), most_bytes=most, keep=9)
+    for number in range(950):
+        writer.write(START + number, frame(number))
+    writer.close()
+    files = [flight, *(flight.with_suffix(f".{n}.tlog") for n in range(1, 10))]
+    assert sorted(flight.parent.iterdir()) == sorted(files)
+    assert [file.stat().st_size for file in files] == [50 * size] + [100 * size] * 9
+    assert [number for file in reversed(files) for number in numbers(file)] == list(range(950))
+
+
+@pytest.mark.parametrize("keep", [1, 3])
+def test_the_disk_never_holds_more_than_was_agreed(flight: Path, keep: int) -> None:
+    most = 4096
+    writer = TlogWriter(str(flight), most_bytes=most, keep=keep)
+    for number in range(2000):
+        writer.write(START + number, frame(number))
+    writer.close()
+    files = sorted(flight.parent.iterdir())
+    assert len(files) == keep + 1
+    assert all(file.stat().st_size <= most for file in files)
+    last = [number for n in range(keep, 0, -1) for number in numbers(flight.with_suffix(f".{n}.tlog"))]
+    last += numbers(flight)
+    assert last == list(range(2000 - len(last), 2000))
+
+
+def test_a_rotation_stops_at_the_first_free_number(flight: Path) -> None:
+    write(flight, 0)
+    for n in (1, 3):
+        flight.with_suffix(f".{n}.tlog").write_bytes(stamped(n))
+    writer = TlogWriter(str(flight), most_bytes=len(stamped(0)))
+    writer.write(START + 9, frame(9))
+    writer.close()
+    found = {file.name: numbers(file) for file in flight.parent.iterdir()}
+    assert found == {"flight.tlog": [9], "flight.1.tlog": [0], "flight.2.tlog": [1], "flight.3.tlog": [3]}
+
+
+def test_a_file_behind_a_link_is_rotated_where_it_is(tmp_path: Path, flight: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    flight.symlink_to(disk / "real.tlog")
+    writer = TlogWriter(str(flight), most_bytes=len(stamped(0)))
+    for number in range(2):
+        writer.write(START + number, frame(number))
+    writer.close()
+    assert sorted(file.name for file in disk.iterdir()) == ["real.1.tlog", "real.tlog"]
+    assert numbers(flight) == [1]
+
+
+def test_a_frame_larger_than_a_file_may_be_is_written_all_the_same(flight: Path) -> None:
+    writer = TlogWriter(str(flight), most_bytes=10, keep=3)
+    for number in range(3):
+        writer.write(START + number, frame(number))
+    writer.close()
+    assert numbers(flight) == [2]
+    assert len(list(flight.parent.iterdir())) == 3
+
+
+def test_a_disk_that_stalls_is_not_felt_and_what_it_costs_is_counted(flight: Path, lines: queue.Queue[str]) -> None:
+    writer = TlogWriter(str(flight))
+    read, pipe = os.pipe()
+    led = Led(flight, pipe)
+    sent = itertools.count()
+
+    def send_too_much() -> None:
+        for number in itertools.islice(sent, 3 * MOST_WAITING // len(stamped(0))):
+            writer.write(START + number, frame(number))
+
+    in_time(send_too_much)
+    assert lines.get(timeout=TIME_OUT) == f"cannot write {flight}: the disk does not keep up; the status goes on"
+    total, dropped, size = next(sent), writer.dropped, len(stamped(0))
+    assert 0 < dropped < total
+    with open(read, "rb") as stalled:
+        content = stalled.read(1)
+        assert writer._waiting_bytes + sum(map(len, writer._batch)) <= 2 * MOST_WAITING
+        # the batch that stalled gets through, and the next one stalls: that is no end of the trouble
+        content += stalled.read((total - dropped) * size - writer._waiting_bytes)
+        assert lines.empty()
+        led.back()
+        content += stalled.read()
+    assert lines.get(timeout=TIME_OUT) == f"writing {flight} again; {dropped} frames are not in it"
+    writer.write(START + total, frame(total))
+    writer.close()
+    assert lines.get_nowait() == f"{flight}: {dropped} frames are not in it"
+    assert lines.empty()
+    content += flight.read_bytes()
+    found = [int.from_bytes(it.payload[:4], "little") for it in Parser(None, 8).feed(content)]
+    assert len(found) * size == len(content)
+    assert len(found) == total + 1 - dropped
+    assert found == sorted(set(found))
+    assert found[-1] == total
+
+
+def test_closing_does_not_wait_for_ever(flight: Path, monkeypatch: pytest.MonkeyPatch, lines: queue.Queue[str]) -> None:
+    monkeypatch.setattr(record, "CLOSE_WAIT", 0.05)
+    writer = TlogWriter(str(flight))
+    read, pipe = os.pipe()
+    led = Led(flight, pipe)
+    for number in range(4000):
+        writer.write(START + number, frame(number))
+    in_time(writer.close)
+    assert 0 < writer.dropped <= 4000
+    told = f"{flight}: {writer.dropped} frames are not in it"
+    in_time(writer.close)
+    assert lines.get_nowait() == told == f"{flight}: {writer.dropped} frames are not in it"
+    assert lines.empty()
+    led.back()
+    with open(read, "rb") as stalled:
+        stalled.read()
+    writer._thread.join(TIME_OUT)
+    assert not writer._thread.is_alive()
+
+
+def test_a_disk_that_refuses_is_tried_again_and_what_waited_is_written(
+    flight: Path, monkeypatch: pytest.MonkeyPatch, lines: queue.Queue[str]
+) -> None:
+    monkeypatch.setattr(record, "RETRY_EVERY", 0.01)
+    writer = TlogWriter(str(flight))
+    Led(flight, os.open("/dev/full", os.O_RDWR)).forget()
+    writer.write(START, frame(0))
+    assert lines.get(timeout=TIME_OUT) == f"cannot write {flight}: No space left on device; the status goes on"
+    # its descriptor was closed; the file is opened anew, and can be written
+    assert lines.get(timeout=TIME_OUT) == f"writing {flight} again; 0 frames are not in it"
+    writer.close()
+    assert lines.empty()
+    assert numbers(flight) == [0]
+
+
+def test_what_waits_while_the_disk_refuses_is_tried_once_more_at_the_end(flight: Path, lines: queue.Queue[str]) -> None:
+    writer = TlogWriter(str(flight))
+    Led(flight, os.open("/dev/full", os.O_RDWR)).forget()
+    writer.write(START, frame(0))
+    assert "No space left" in lines.get(timeout=TIME_OUT)
+    writer.write(START + 1, frame(1))
+    writer.close()
+    assert writer.dropped == 0
+    assert numbers(flight) == [0, 1]
+
+
+def child(script: str, path: Path) -> subprocess.Popen[str]:
+    code = textwrap.dedent(CHILD) + textwrap.dedent(script)
+    return subprocess.Popen([sys.executable, "-c", code, str(path)], stdout=subprocess.PIPE, text=True)
+
+
+CHILD = """
+    import itertools, json, logging, os, queue, resource, sys, threading
+    from mav_robot_status.link import record
+    from mav_robot_status.mavlink import definitions as mav
+    from mav_robot_status.mavlink.encode import encode
+
+    START = 1_700_000_000_000_000
+    path = sys.argv[1]
+
+    def write(number):
+        frame = encode(mav.Heartbeat(number, 10, 3, 81, 4, 3), system=1, component=1, sequence=number % 256)
+        writer.write(START + number, frame)
+"""
+
+
+def test_a_disk_that_is_full_costs_whole_records_only_and_is_written_again(flight: Path) -> None:
+    """A limit for the size of files is met as a full disk is: part of a write is done, the next one is refused."""
+    limit = 10_000
+    process = child(
+        f"""
+        lines = queue.Queue()
+        class Handler(logging.Handler):
+            def emit(self, record):
+                lines.put(record.getMessage())
+        record.log.addHandler(Handler())
+        record.RETRY_EVERY = 0.05
+        resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, resource.RLIM_INFINITY))
+        writer = record.TlogWriter(path)
+        written = 50_000
+        for number in range(written):
+            write(number)
+        said = [lines.get(timeout={TIME_OUT})]
+        while said[-1].endswith("keep up; the status goes on"):
+            said.append(lines.get(timeout={TIME_OUT}))
+        full = os.path.getsize(path)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        said.append(lines.get(timeout={TIME_OUT}))
+        write(written)
+        writer.close()
+        print(json.dumps([said, full, writer.dropped]))
+        """,
+        flight,
+    )
+    out, _ = process.communicate(timeout=2 * TIME_OUT)
+    said, full, dropped = json.loads(out)
+    size = len(stamped(0))
+    assert full == limit // size * size  # not a byte of a torn one
+    assert said[-2:] == [
+        f"cannot write {flight}: File too large; the status goes on",
+        f"writing {flight} again; {dropped} frames are not in it",
+    ]
+    assert dropped > 0
+    found = numbers(flight)
+    assert len(found) == 50_001 - dropped
+    assert found[-1] == 50_000
+    assert found == sorted(set(found))
+    assert flight.stat().st_size == len(found) * size
+
+
+def test_a_killed_process_loses_a_second_and_tears_one_record_at_most(flight: Path) -> None:
+    process = child(
+        """
+        writer = record.TlogWriter(path)
+        for number in range(1000):
+            write(number)
+        threading.Event().wait(1.0)
+        print("a second later", flush=True)
+        for number in itertools.count(1000):
+            write(number)
+            if number % 10_000 == 0:
+                print(number, flush=True)
+        """,
+        flight,
+    )
+    assert process.stdout
+    with process.stdout:
+        for _ in range(4):
+            assert process.stdout.readline()
+        process.send_signal(signal.SIGKILL)
+        process.wait(TIME_OUT)
+    before = flight.read_bytes()
+    recording = Recording(str(flight))
+    found = [int.from_bytes(it.what.payload[:4], "little") for it in recording if it.what is not None]
+    assert found[:1000] == list(range(1000))
+    assert found == sorted(set(found))
+    torn = len(before) % len(stamped(0))
+    assert "garbage" not in recording.summary()
+    write(flight, 7)
+    assert flight.read_bytes() == before[: len(before) - torn] + stamped(7)
+
+
+def test_closing_twice_is_closing_once_and_what_comes_after_is_counted(flight: Path) -> None:
+    writer = TlogWriter(str(flight))
+    writer.write(START, frame(0))
+    writer.close()
+    writer.write(START, frame(1))
+    writer.close()
+    assert writer.dropped == 1
+    assert numbers(flight) == [0]
+
+
+@pytest.mark.parametrize(("stamp", "found"), [(-1, 0), (0, 0), (1 << 64, (1 << 64) - 1)])
+def test_a_clock_that_is_absurd_raises_nothing(flight: Path, stamp: int, found: int) -> None:
+    writer = TlogWriter(str(flight))
+    writer.write(stamp, frame(0))
+    writer.close()
+    assert flight.read_bytes() == found.to_bytes(8, "big") + frame(0)
+
+
+def test_what_is_done_is_said_in_words(flight: Path) -> None:
+    writer = TlogWriter(str(flight))
+    assert writer.text == f"recording to {flight}"
+    writer.close()

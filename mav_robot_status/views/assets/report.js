@@ -1,0 +1,693 @@
+"use strict";
+// Everything that came from a log is hostile: it only ever becomes a text node or a number.
+
+// What turns the direction of writing, or cannot be seen, is shown as a box.
+const UNSEEN = /[\u0000-\u001f\u007f-\u009f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]/g;
+const clean = (value) => typeof value === "string" ? value.replace(UNSEEN, "\ufffd") : value;
+
+const DATA = JSON.parse(document.getElementById("data").textContent, (_, value) => clean(value));
+const SVG = "http://www.w3.org/2000/svg";
+const ROW = 24, TOP = 4, BODY = 16; // px: a row, and what is drawn in it
+const FINE = 2, CELL = 3; // px: an interval narrower than FINE is drawn together with its neighbours, in cells
+const SHORTEST = 1000; // microseconds: the most that one can zoom in
+const STEPS = [1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 5e6, 1e7, 15e6, 3e7, 6e7, 12e7, 3e8, 6e8, 9e8,
+  18e8, 36e8, 72e8, 108e8, 216e8, 432e8, 864e8, 1728e8, 6048e8, 2592e9, 7776e9, 31536e9];
+const FIELDS = [ // track, how its TRUE is drawn
+  ["link"], ["flight_mode"], ["mode"], ["armed", "on"], ["drives_powered", "on"], ["motion_possible", "on"],
+  ["in_motion", "on"], ["e_stopped", "stop"], ["in_error", "alarm"],
+];
+const MORE = 1000; // rows of the table of changes that are shown at once
+const MOST_CYCLES = 50; // that are listed
+
+// -- words -------------------------------------------------------------------------------------------------------------
+
+const two = (n) => String(n).padStart(2, "0");
+
+function duration(us) {
+  const s = us / 1e6;
+  if (us === 0) return "0 s";
+  if (s < 0.1) return `${(s * 1000).toFixed(us < 1e4 ? 1 : 0)} ms`;
+  if (s < 60) return `${Math.min(59.9, s).toFixed(1)} s`;
+  const whole = Math.round(s), h = Math.floor(whole / 3600), m = Math.floor(whole / 60) % 60;
+  return h ? `${h} h ${two(m)} min` : `${m} min ${two(whole % 60)} s`;
+}
+
+function utc(us, step) { // time of day
+  const at = new Date(Math.floor(us / 1000));
+  if (isNaN(at)) return "?";
+  const text = at.toISOString().slice(-13, -1); // HH:MM:SS.mmm
+  return step === undefined || step < 1e6 ? text : step < 6e7 ? text.slice(0, 8) : text.slice(0, 5);
+}
+
+function day(us) {
+  const at = new Date(Math.floor(us / 1000));
+  return isNaN(at) ? "?" : at.toISOString().slice(0, -14);
+}
+
+function elapsed(us, step) {
+  const ms = Math.round(us / 1000), s = Math.floor(ms / 1000);
+  const whole = `+${Math.floor(s / 3600)}:${two(Math.floor(s / 60) % 60)}:${two(s % 60)}`;
+  return step === undefined || step < 1e6 ? `${whole}.${String(ms % 1000).padStart(3, "0")}` : whole;
+}
+
+const percent = (part, whole) => {
+  const share = whole ? 100 * part / whole : 0;
+  return part > 0 && share < 1 ? "< 1 %" : part < whole && share > 99 ? "> 99 %" : `${Math.round(share)} %`;
+};
+
+// -- elements ----------------------------------------------------------------------------------------------------------
+
+function make(name, attributes = {}, ...children) {
+  const element = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  element.append(...children.filter((child) => child !== null));
+  return element;
+}
+
+function draw(name, attributes, text) {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text !== undefined) element.textContent = text;
+  return element;
+}
+
+const box = (kind, x, width, y = TOP, height = BODY) =>
+  draw("rect", { class: kind, x, y, width: Math.max(0.5, width), height });
+
+const pen = document.createElement("canvas").getContext("2d");
+pen.font = "600 11px system-ui, sans-serif";
+const widths = new Map();
+
+function widthOf(text) {
+  if (!widths.has(text)) widths.set(text, pen.measureText(text).width);
+  return widths.get(text);
+}
+
+function label(kind, x, width, text, y = 16) { // as much of a text as there is room for
+  const room = width - 9, whole = widthOf(text);
+  if (room < 16 || !text) return [];
+  const letters = whole <= room ? text.length : Math.floor(text.length * (room - 10) / whole);
+  if (letters < 3 && letters < text.length) return [];
+  return [draw("text", { class: kind, x: x + 5, y }, letters < text.length ? `${text.slice(0, letters)}…` : text)];
+}
+
+// How a value is drawn: not by colour alone. TRUE fills the row, FALSE is a rail, UNKNOWN is hatched.
+function figure(row, span, x, width, right) {
+  const from = Math.max(0, x), seen = Math.min(right, x + width) - from;
+  switch (span.value) {
+    case "TRUE": return [box(row.on, x, width), ...label(`${row.on}-text`, from, seen, row.word(span))];
+    case "FALSE": return [box("off", x, width, TOP + BODY - 3, 3), ...label("off-text", from, seen, "FALSE", 14)];
+    case "CONNECTED":
+      return [box("off", x, width, TOP + BODY - 3, 3), ...label("off-text", from, seen, "CONNECTED", 14)];
+    case "UNKNOWN": return [box("unknown", x, width), ...label("halo", from, seen, "UNKNOWN")];
+    case "LOST": return [box("lost", x, width), ...label("halo", from, seen, "LOST")];
+    case "NEVER_SEEN": return [box("never", x, width), ...label("halo", from, seen, "NEVER SEEN")];
+    case "AUTO": if (row.id === "mode") return [box("on", x, width), ...label("on-text", from, seen, "AUTO")]; break;
+    case "MANUAL": if (row.id === "mode") return [box("manual", x, width), ...label("halo", from, seen, "MANUAL")];
+  }
+  return [box(`name-${span.index % 2}`, x, width), ...label("", from, seen, span.value)];
+}
+
+// Many short intervals in a few pixels: the height of TRUE is its share of the time.
+function texture(row, cell, x, width) {
+  const whole = cell.end - cell.start || 1, yes = (cell.TRUE || 0) / whole, unsure = (cell.UNKNOWN || 0) / whole;
+  if (!row.on) return [box("off", x, width)];
+  const figures = [box("off", x, width, TOP + BODY - 3, 3)];
+  const height = cell.TRUE === undefined ? 0 : Math.max(4, yes * BODY);
+  if (height) figures.push(box(row.on, x, width, TOP + BODY - height, height));
+  if (cell.UNKNOWN !== undefined) figures.push(box("unknown", x, width, TOP, Math.max(3, unsure * (BODY - height))));
+  return figures;
+}
+
+// -- one log -----------------------------------------------------------------------------------------------------------
+
+class Clock { // of a log: where it was set there is a gap between two segments
+  constructor(segments) {
+    this.segments = segments;
+    const length = Math.max(segments.length ? segments[segments.length - 1][1] : 0, SHORTEST);
+    this.gap = segments.length > 1 ? Math.round(length * 0.02) : 0;
+    this.length = length + this.gap * (segments.length - 1);
+  }
+  index(at) { // of the segment in which something begins
+    let low = 0, high = this.segments.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.segments[middle][0] <= at) low = middle; else high = middle - 1;
+    }
+    return low;
+  }
+  shift(start) { return this.index(start) * this.gap; }
+  find(place) { // the segment at a place of the picture, and the log's own time there; null in a gap
+    for (let i = this.segments.length - 1; i >= 0; i--) {
+      const at = place - i * this.gap, [start, end] = this.segments[i];
+      if (at >= start && (at <= end || i === this.segments.length - 1)) return { i, at };
+      if (at >= start) return null;
+    }
+    return { i: 0, at: 0 };
+  }
+  unix(place) {
+    const found = this.find(place);
+    return found && this.segments[found.i][2] + found.at - this.segments[found.i][0];
+  }
+}
+
+class Log {
+  constructor(data) {
+    this.data = data;
+    this.clock = new Clock(data.segments);
+    this.from = 0;
+    this.to = this.clock.length;
+    this.rows = [];
+    this.pointers = new Map();
+    this.build();
+  }
+
+  string(number) { return this.data.strings[number]; }
+
+  spans(packed) { // four numbers each: since the last one's end, length, value or text, why
+    const spans = [];
+    for (let i = 0, at = 0; i < packed.length; i += 4) {
+      const start = at + packed[i], [rule, source] = this.string(packed[i + 3]) || [];
+      at = start + packed[i + 1];
+      const shift = this.clock.shift(start);
+      spans.push({ start: start + shift, end: at + shift, value: this.string(packed[i + 2]), rule, source,
+        index: spans.length });
+    }
+    return spans;
+  }
+
+  build() {
+    const { data, clock } = this, first = clock.segments[0], last = clock.segments[clock.segments.length - 1];
+    const count = data.vehicles.length, jumps = clock.segments.length - 1;
+    const began = first ? first[2] : 0, ended = last ? last[2] + last[1] - last[0] : 0;
+    const about = [`${day(began)} ${utc(began, 1e6)} to `,
+      `${day(ended) === day(began) ? "" : `${day(ended)} `}${utc(ended, 1e6)} UTC`,
+      `, ${duration(last ? last[1] : 0)}, ${count} ${count === 1 ? "vehicle" : "vehicles"}`,
+      jumps ? `, the log's clock was set ${jumps === 1 ? "once" : `${jumps} times`}` : ""].join("");
+    this.range = make("output");
+    const button = (text, title, act) => {
+      const made = make("button", { type: "button", title, "aria-label": title }, text);
+      made.addEventListener("click", act);
+      return made;
+    };
+    this.utc = this.plot("Time, UTC");
+    this.elapsed = this.plot("Elapsed");
+    this.utc.plot.tabIndex = 0;
+    this.utc.plot.setAttribute("role", "group");
+    this.utc.plot.setAttribute("aria-label",
+      "Time axis. Left and right move, plus and minus zoom, 0 shows the whole flight");
+    this.cross = make("div", { class: "cross" });
+    this.thumb = make("i");
+    this.chart = make("div", { class: "chart" }, this.utc.element, ...data.vehicles.map((v) => this.vehicle(v)),
+      this.elapsed.element, make("div", { class: "where" }, this.thumb), this.cross);
+    this.utc.element.classList.add("axis", "utc");
+    this.elapsed.element.classList.add("axis", "elapsed");
+    this.element = make("section", { class: "log" },
+      make("div", { class: "head" }, make("div", {}, make("h2", {}, data.name), make("p", { class: "soft" }, about)),
+        make("div", { class: "tools" }, this.range,
+          button("−", "Zoom out (-)", () => this.zoom(2)), button("+", "Zoom in (+)", () => this.zoom(0.5)),
+          button("Whole flight", "Whole flight (0)", () => this.show(0, clock.length)))),
+      count ? this.chart : make("p", {}, "No autopilot was heard in this log."),
+      ...data.vehicles.map((v) => totalsOf(this, v)), count ? new Changes(this).element : null);
+    this.listen();
+  }
+
+  plot(text, figures = "") {
+    const svg = draw("svg", { height: ROW, "aria-hidden": "true" });
+    const plot = make("div", { class: "plot" }, svg);
+    const head = make("div", { class: "label" }, make("b", {}, text), make("span", {}, figures));
+    return { element: make("div", {}, head, plot), plot, svg };
+  }
+
+  vehicle(vehicle) {
+    const kind = [vehicle.autopilot, vehicle.type].filter(Boolean).join(", ");
+    const { totals } = vehicle;
+    const element = make("div", { class: "vehicle" }, make("div", { class: "name" },
+      make("h3", {}, `Vehicle ${vehicle.name} `, make("span", { class: "soft" }, kind)),
+      make("p", { class: "soft" }, vehicle.handle)));
+    const add = (row) => {
+      const made = this.plot(row.title || row.id, row.figures);
+      Object.assign(row, made, { vehicle, chosen: -1 });
+      row.element.classList.add("row");
+      row.plot.tabIndex = 0;
+      row.plot.setAttribute("role", "group");
+      row.plot.setAttribute("aria-roledescription", "timeline");
+      row.plot.setAttribute("aria-label", `${row.title || row.id}, vehicle ${vehicle.name}: ${row.figures}, `
+        + `${row.spans.length} intervals. Left and right step through them, Enter zooms`);
+      this.rows.push(row);
+      element.append(row.element);
+    };
+    let cycle = 0;
+    const cycles = totals.arm_cycles.map((c) => c.start + this.clock.shift(c.start));
+    for (const [id, on] of FIELDS) {
+      const spans = this.spans(vehicle.tracks[id]).filter((span) => span.value !== "");
+      const word = id !== "armed" ? () => "TRUE" : (span) => `TRUE, cycle ${span.cycle}`;
+      if (id === "armed") {
+        for (const span of spans) {
+          if (cycles[cycle] === span.start) cycle++;
+          span.cycle = cycle;
+        }
+      }
+      add({ id, on, spans, word, figures: shortly(id, totals) });
+    }
+    const kinds = [["errors", "Error causes", "alarm"], ["inhibits", "Why motion is not possible", "why"]];
+    for (const [list, kind, on] of kinds) {
+      if (totals[list].length) element.append(make("div", { class: "group" }, kind));
+      for (const total of totals[list]) {
+        const spans = this.spans(vehicle[list][total.name]);
+        for (const span of spans) Object.assign(span, { text: span.value, value: "TRUE" });
+        const title = total.code === null ? total.name : `${total.code} ${total.name}`;
+        add({ id: total.name, title, on, spans, reason: true, word: (span) => span.text || "",
+          figures: `${total.occurrences} ×, ${duration(total.active)}` });
+      }
+    }
+    this.rows[this.rows.length - 1].element.classList.add("spaced");
+    return element;
+  }
+
+  // -- drawing
+
+  get width() { return this.utc.plot.clientWidth || 1; }
+  x(place) { return (place - this.from) / (this.to - this.from) * this.width; }
+  place(x) { return this.from + x / this.width * (this.to - this.from); }
+
+  redraw() {
+    if (this.frame) return;
+    this.frame = requestAnimationFrame(() => { this.frame = 0; this.redrawNow(); });
+  }
+
+  redrawNow() {
+    const ticks = this.ticks();
+    for (const row of this.rows) this.drawRow(row, ticks);
+    this.drawAxis(ticks);
+    const whole = this.clock.length;
+    this.thumb.style.left = `${100 * this.from / whole}%`;
+    this.thumb.style.width = `${100 * (this.to - this.from) / whole}%`;
+    const shown = this.to - this.from;
+    this.range.textContent = shown >= whole ? "" : `${duration(shown)} of ${duration(whole)}`;
+  }
+
+  step() { // the finest for whose words there is room
+    const room = (step) => step < 1e6 ? 100 : step < 6e7 ? 80 : 66;
+    return STEPS.find((s) => (this.to - this.from) / s * room(s) <= this.width) || STEPS[STEPS.length - 1];
+  }
+
+  ticks() {
+    const step = this.step(), found = [];
+    for (const [i, [start, end, unix]] of this.clock.segments.entries()) {
+      const shift = i * this.clock.gap, offset = unix - start - shift; // UTC = place + offset
+      const low = Math.max(this.from, start + shift) + offset, high = Math.min(this.to, end + shift) + offset;
+      for (let at = Math.ceil(low / step) * step; at <= high; at += step) found.push({ at, x: this.x(at - offset) });
+    }
+    return { step, found };
+  }
+
+  drawAxis({ step, found }) {
+    const figures = [];
+    let before = "", right = -Infinity;
+    for (const { at, x } of found) {
+      figures.push(draw("line", { class: "tick", x1: x, x2: x, y1: 17, y2: ROW }));
+      const date = day(at), words = step >= 864e8 || (before && date !== before) ? date : utc(at, step);
+      if (x < right || x + widthOf(words) > this.width) continue;
+      figures.push(draw("text", { x: x + 2, y: 12 }, words));
+      right = x + widthOf(words) + 8;
+      before = date;
+    }
+    for (const x of this.breaks()) figures.push(draw("text", { class: "day", x: x + 2, y: 12 }, "clock set"));
+    this.utc.svg.replaceChildren(...figures);
+    const other = [];
+    const own = this.step();
+    for (const [i, [start, end]] of this.clock.segments.entries()) {
+      const shift = i * this.clock.gap;
+      const low = Math.max(this.from - shift, start), high = Math.min(this.to - shift, end);
+      for (let at = Math.ceil(low / own) * own; at <= high; at += own) {
+        const x = this.x(at + shift), words = elapsed(at, own);
+        other.push(draw("line", { class: "tick", x1: x, x2: x, y1: 0, y2: 6 }));
+        if (x + widthOf(words) <= this.width) other.push(draw("text", { x: x + 2, y: 16 }, words));
+      }
+    }
+    this.elapsed.svg.replaceChildren(...other);
+  }
+
+  breaks() { // where gaps begin, in pixels
+    const segments = this.clock.segments.slice(0, -1), gap = this.clock.gap;
+    return segments.map(([, end], i) => this.x(end + i * gap)).filter((x) => x > -100 && x < this.width);
+  }
+
+  drawRow(row, { found }) {
+    const { width } = this, figures = [];
+    for (const { x } of found) figures.push(draw("line", { class: "tick", x1: x, x2: x, y1: 0, y2: ROW }));
+    const gap = this.clock.gap / (this.to - this.from) * width;
+    for (const x of this.breaks()) figures.push(box("break", x, gap, 0, ROW));
+    let cell = null;
+    const flush = () => {
+      if (cell) {
+        const x = this.x(cell.start), wide = this.x(cell.end) - x;
+        figures.push(...(cell.only ? this.drawSpan(row, cell.only, x, Math.max(wide, FINE))
+          : texture(row, cell, x, Math.max(wide, FINE))));
+      }
+      cell = null;
+    };
+    for (let i = firstAfter(row.spans, this.from); i < row.spans.length && row.spans[i].start < this.to; i++) {
+      const span = row.spans[i], x = this.x(span.start), wide = this.x(span.end) - x;
+      if (wide >= FINE) {
+        flush();
+        figures.push(...this.drawSpan(row, span, x, wide));
+        continue;
+      }
+      if (cell && (this.x(span.end) - this.x(cell.start) > CELL)) flush();
+      cell = cell ? { ...cell, only: null } : { start: span.start, end: span.end, only: span };
+      cell.end = span.end;
+      cell[span.value] = (cell[span.value] || 0) + span.end - span.start;
+    }
+    flush();
+    const chosen = row.spans[row.chosen];
+    if (chosen && document.activeElement === row.plot) {
+      const x = this.x(chosen.start), wide = Math.max(4, this.x(chosen.end) - x);
+      const from = Math.max(1, x), to = Math.min(width - 1, x + wide);
+      if (to > from) figures.push(box("chosen", from, to - from, 1.5, ROW - 3));
+    }
+    row.svg.replaceChildren(...figures);
+  }
+
+  drawSpan(row, span, x, wide) {
+    if (x < -20) { wide += x + 20; x = -20; } // patterns far outside cost time
+    wide = Math.min(wide, this.width + 40 - x);
+    const figures = figure(row, span, x, wide, this.width);
+    if (row.reason && x >= 0) { // a mark that is seen however short the cause was
+      figures.push(draw("path", { class: `mark ${row.on}`, d: `M${Math.max(4, x) - 4} 1h8l-4 7z` }));
+    }
+    return figures;
+  }
+
+  // -- moving about
+
+  show(from, to) {
+    const whole = this.clock.length, length = Math.min(whole, Math.max(SHORTEST, to - from));
+    this.from = Math.min(Math.max(0, from + (to - from - length) / 2), whole - length);
+    this.to = this.from + length;
+    this.redraw();
+  }
+
+  zoom(factor, at = (this.from + this.to) / 2) {
+    this.show(at - (at - this.from) * factor, at + (this.to - at) * factor);
+  }
+
+  pan(share) {
+    const by = (this.to - this.from) * share;
+    this.show(this.from + by, this.to + by);
+  }
+
+  listen() {
+    const plots = new Map(this.rows.map((row) => [row.plot, row]));
+    const rowAt = (event) => plots.get(event.target.closest && event.target.closest(".plot"));
+    const inside = (event) => event.target.closest && event.target.closest(".plot");
+    const x = (event) => event.clientX - this.utc.plot.getBoundingClientRect().left;
+    this.chart.addEventListener("wheel", (event) => {
+      if (!inside(event)) return;
+      const across = Math.abs(event.deltaX) > Math.abs(event.deltaY);
+      // A wheel over a page scrolls it. It zooms over the time axis, where one has clicked, and with Ctrl.
+      if (!across && !event.ctrlKey && !event.metaKey && !event.target.closest(".axis")
+        && !this.chart.contains(document.activeElement)) return;
+      event.preventDefault();
+      const lines = event.deltaMode === 1 ? 16 : 1;
+      if (across) this.pan(event.deltaX * lines / this.width);
+      else this.zoom(Math.exp(Math.max(-240, Math.min(240, event.deltaY * lines)) * 0.003), this.place(x(event)));
+    }, { passive: false });
+    this.chart.addEventListener("pointerdown", (event) => {
+      if (!inside(event) || event.button !== 0) return;
+      this.pointers.set(event.pointerId, x(event));
+      this.dragged = false;
+    });
+    this.chart.addEventListener("pointermove", (event) => {
+      const row = rowAt(event);
+      active = this;
+      if (!this.pointers.has(event.pointerId)) {
+        if (inside(event)) this.hover(row, x(event)); else this.leave();
+        return;
+      }
+      const before = [...this.pointers.values()], length = this.to - this.from, to = x(event);
+      if (!this.dragged && before.length === 1 && Math.abs(to - before[0]) < 3) return;
+      if (!this.dragged) this.chart.setPointerCapture(event.pointerId);
+      this.dragged = true;
+      const other = [...this.pointers].find(([id]) => id !== event.pointerId);
+      const was = this.pointers.get(event.pointerId);
+      this.pointers.set(event.pointerId, to);
+      if (other) { // two fingers: the places under them stay under them
+        const apart = Math.max(8, Math.abs(was - other[1])), now = Math.max(8, Math.abs(to - other[1]));
+        this.zoom(apart / now, this.place(other[1]));
+      } else {
+        const by = (was - to) / this.width * length;
+        this.show(this.from + by, this.to + by);
+      }
+    });
+    for (const name of ["pointerup", "pointercancel"]) {
+      this.chart.addEventListener(name, (event) => {
+        if (this.pointers.delete(event.pointerId) && !this.dragged && name === "pointerup") {
+          const row = rowAt(event);
+          if (row) this.choose(row, indexAt(row.spans, this.place(x(event))), false);
+          this.hover(row, x(event));
+        }
+      });
+    }
+    this.chart.addEventListener("pointerleave", () => this.leave());
+    this.chart.addEventListener("dblclick", (event) => {
+      const row = rowAt(event), span = row && row.spans[indexAt(row.spans, this.place(x(event)))];
+      if (span) this.fit(span);
+    });
+    this.chart.addEventListener("focusin", (event) => { active = this; this.redraw(); });
+    this.chart.addEventListener("focusout", () => this.redraw());
+    this.chart.addEventListener("keydown", (event) => {
+      const row = plots.get(event.target);
+      if (row && !event.ctrlKey && !event.metaKey && !event.altKey && !event.shiftKey && this.rowKey(row, event.key)) {
+        event.preventDefault();
+        event.stopPropagation();
+      }
+    });
+  }
+
+  rowKey(row, key) { // true if the key was for the row
+    const last = row.spans.length - 1, here = this.rows.indexOf(row);
+    const step = { ArrowLeft: row.chosen - 1, ArrowRight: row.chosen + 1, Home: 0, End: last }[key];
+    if (step !== undefined) {
+      const first = Math.max(0, indexAfter(row.spans, this.from));
+      this.choose(row, row.chosen < 0 ? first : Math.min(last, Math.max(0, step)));
+    } else if (key === "ArrowUp" || key === "ArrowDown") {
+      const next = this.rows[here + (key === "ArrowUp" ? -1 : 1)];
+      if (!next) return false;
+      const span = row.spans[row.chosen];
+      next.plot.focus();
+      if (span) this.choose(next, indexAt(next.spans, Math.max(span.start, this.from)));
+    } else if (key === "Enter" && row.spans[row.chosen]) {
+      this.fit(row.spans[row.chosen]);
+    } else if (key === "Escape") {
+      row.plot.blur();
+    } else return false;
+    return true;
+  }
+
+  fit(span) {
+    const around = (span.end - span.start) * 0.1 || SHORTEST;
+    this.show(span.start - around, span.end + around);
+  }
+
+  choose(row, index, spoken = true) {
+    row.chosen = index;
+    const span = row.spans[index];
+    if (!span) return;
+    const length = this.to - this.from;
+    if (span.end <= this.from || span.start >= this.to) this.show(span.start - length / 2, span.start + length / 2);
+    this.redraw();
+    if (!spoken) return;
+    this.inspect(row, span, Math.min(Math.max(span.start, this.from), span.end));
+    document.getElementById("live").textContent = this.describe(row, span).join(". ");
+  }
+
+  // -- telling
+
+  hover(row, x) {
+    const place = this.place(Math.min(Math.max(0, x), this.width));
+    this.cross.style.display = "block";
+    this.cross.style.left = `${this.utc.plot.offsetLeft + x}px`;
+    this.inspect(row, row && row.spans[indexAt(row.spans, place, FINE / this.width * (this.to - this.from))], place);
+  }
+
+  leave() { this.cross.style.display = "none"; }
+
+  inspect(row, span, place) {
+    const at = this.clock.find(place), unix = this.clock.unix(place);
+    const time = at ? [make("b", {}, utc(unix)), ` UTC, ${elapsed(at.at)}`] : [make("b", {}, "the log's clock was set")];
+    const words = !row ? [] : span ? this.describe(row, span) : [`${row.title || row.id}: not active here`];
+    const panel = document.getElementById("inspector");
+    panel.replaceChildren(make("p", {}, ...time), make("div", {},
+      make("p", {}, make("b", {}, words[0] || "")), make("p", { class: "text soft" }, words.slice(1).join("   "))));
+    panel.classList.add("shown");
+  }
+
+  describe(row, span) { // what, when, why
+    const name = row.title || row.id, many = this.data.vehicles.length > 1 ? `vehicle ${row.vehicle.name}, ` : "";
+    const state = row.reason ? "active" : row.on && span.value === "TRUE" ? row.word(span) : span.value;
+    const from = this.clock.unix(span.start), lasted = duration(span.end - span.start);
+    const words = [`${many}${name}: ${state}, ${lasted}, ${utc(from)} to ${utc(from + span.end - span.start)}`];
+    if (span.text) words.push(`“${span.text}”`);
+    if (span.rule) words.push(span.rule);
+    if (span.source) words.push(`[${span.source}]`);
+    return words;
+  }
+}
+
+function firstAfter(spans, place) { // the first that ends after the place
+  let low = 0, high = spans.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (spans[middle].end > place) high = middle; else low = middle + 1;
+  }
+  return low;
+}
+
+function indexAfter(spans, place) { return Math.min(spans.length - 1, firstAfter(spans, place)); }
+
+function indexAt(spans, place, near = 0) {
+  const i = firstAfter(spans, place - near);
+  return i < spans.length && spans[i].start <= place + near ? i : -1;
+}
+
+// -- tables ------------------------------------------------------------------------------------------------------------
+
+function shortly(id, { values, arm_cycles: cycles }) {
+  const lasted = values[id];
+  if (id === "armed") return `${cycles.length} ×, ${duration(lasted.TRUE || 0)}`;
+  if (id === "link") return lasted.LOST ? `lost ${duration(lasted.LOST)}` : "never lost";
+  if (id === "flight_mode") return "";
+  if (id === "mode") return `AUTO ${duration(lasted.AUTO || 0)}`;
+  return `TRUE ${duration(lasted.TRUE || 0)}`;
+}
+
+function table(caption, heads, rows) {
+  const cell = (name, head, text) => {
+    const kind = !head.startsWith("#") ? "text" : text === "0 s" ? "number zero" : "number";
+    return make(name, { class: kind, ...(name === "th" ? { scope: "col" } : {}) }, ...[text].flat());
+  };
+  return make("div", { class: "wide" }, make("table", {}, make("caption", {}, caption),
+    make("thead", {}, make("tr", {}, ...heads.map((head) => cell("th", head, head.replace("#", ""))))),
+    make("tbody", {}, ...rows.map((row) => make("tr", {}, make("th", { scope: "row" }, row[0]),
+      ...row.slice(1).map((text, i) => cell("td", heads[i + 1], text)))))));
+}
+
+function totalsOf(log, vehicle) {
+  const { totals } = vehicle, { values, watched } = totals;
+  const lasted = (name, value) => {
+    const us = values[name][value] || 0;
+    return us ? [duration(us), make("span", { class: "share" }, percent(us, watched))] : "0 s";
+  };
+  const time = (at) => utc(log.clock.unix(at + log.clock.shift(at)), 1e6);
+  const fields = ["armed", "drives_powered", "motion_possible", "in_motion", "e_stopped", "in_error"];
+  const parts = [
+    table(`Time in each state, of ${duration(watched)} since it was first heard`,
+      ["field", "#TRUE", "#FALSE", "#UNKNOWN"],
+      fields.map((name) => [name, lasted(name, "TRUE"), lasted(name, "FALSE"), lasted(name, "UNKNOWN")])),
+    table("Time in each mode, and without link", ["field", "#time"], [
+      ["link LOST", lasted("link", "LOST")],
+      ...["MANUAL", "AUTO", "UNKNOWN"].map((mode) => [`mode ${mode}`, lasted("mode", mode)]),
+      ...Object.keys(values.flight_mode).filter(Boolean).map((mode) =>
+        [`flight_mode ${clean(mode)}`, lasted("flight_mode", mode)])]),
+  ];
+  if (totals.arm_cycles.length) {
+    const count = totals.arm_cycles.length;
+    const first = count > MOST_CYCLES ? `, the first ${MOST_CYCLES} of ${count}` : "";
+    const cycles = totals.arm_cycles.slice(0, MOST_CYCLES);
+    parts.push(table(`Arm cycles${first}`, ["cycle", "#from", "#to", "#armed"], cycles.map((c, i) =>
+      [String(i + 1), time(c.start), utc(log.clock.unix(c.start + log.clock.shift(c.start)) + c.end - c.start, 1e6),
+        duration(c.armed)])));
+  }
+  for (const [list, caption] of [["errors", "Error causes"], ["inhibits", "Why motion was not possible"]]) {
+    if (!totals[list].length) continue;
+    parts.push(table(caption, ["name", "#times", "#time", "in the autopilot's words"], totals[list].map((t) =>
+      [t.code === null ? t.name : `${t.code} ${t.name}`, String(t.occurrences), duration(t.active),
+        t.texts.join("; ")])));
+  }
+  return make("div", {}, make("h3", { class: "over" }, `Totals, vehicle ${vehicle.name}`),
+    make("div", { class: "totals" }, ...parts));
+}
+
+class Changes { // every change as text: for search, for a screen reader
+  constructor(log) {
+    this.log = log;
+    this.rows = log.rows.flatMap((row) => row.spans.flatMap((span, i) => this.ofSpan(row, span, row.spans[i - 1])));
+    this.rows.sort((a, b) => a[0] - b[0]);
+    this.body = make("tbody");
+    this.more = make("button", { type: "button" });
+    this.more.addEventListener("click", () => this.add());
+    const heads = ["UTC", "elapsed", ...(this.many ? ["vehicle"] : []), "what", "why"];
+    this.element = make("details", {}, make("summary", {}, `Every change as text (${this.rows.length})`),
+      make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
+        this.body), this.more);
+    this.add();
+  }
+  get many() { return this.log.data.vehicles.length > 1; }
+  ofSpan(row, span, before) {
+    const name = row.title || row.id;
+    const why = span.text ? `“${span.text}”` : [span.rule, span.source && `[${span.source}]`].filter(Boolean).join("  ");
+    if (!row.reason) {
+      return [[span.start, row, `${name}: ${before ? `${before.value} → ` : ""}${span.value}`, why]];
+    }
+    const goesOn = before && before.end === span.start;
+    const next = row.spans[span.index + 1];
+    const begins = [span.start, row, goesOn ? `${name} goes on, with another text` : `${name} begins`, why];
+    return next && next.start === span.end ? [begins] : [begins, [span.end, row, `${name} ends`, ""]];
+  }
+  add() {
+    const { clock } = this.log, made = document.createDocumentFragment();
+    for (const [place, row, what, why] of this.rows.splice(0, MORE)) {
+      const found = clock.find(place);
+      made.append(make("tr", {}, make("td", {}, found ? `${day(clock.unix(place))} ${utc(clock.unix(place))}` : ""),
+        make("td", {}, found ? elapsed(found.at) : ""), this.many ? make("td", {}, row.vehicle.name) : null,
+        make("td", { class: "text" }, what), make("td", { class: "text" }, why)));
+    }
+    this.body.append(made);
+    this.more.hidden = !this.rows.length;
+    this.more.textContent = `Show ${Math.min(MORE, this.rows.length)} more of ${this.rows.length}`;
+  }
+}
+
+// -- the page ----------------------------------------------------------------------------------------------------------
+
+const main = document.getElementById("main");
+const logs = DATA.logs.map((data) => new Log(data));
+let active = logs[0];
+main.append(...logs.map((log) => log.element));
+
+const sample = { id: "", on: "on", word: () => "" };
+for (const [value, words] of [["TRUE", "TRUE"], ["FALSE", "FALSE"], ["UNKNOWN", "UNKNOWN"], ["LOST", "link lost"]]) {
+  const svg = draw("svg", { width: 30, height: ROW, "aria-hidden": "true" });
+  svg.append(...figure(sample, { value, index: 0 }, 1, 28, 0).filter((made) => made.tagName !== "text"));
+  document.getElementById("legend").append(make("li", {}, svg, words));
+}
+const keys = [["wheel on the axis or Ctrl+wheel", "zoom"], ["drag", "move"], ["double click", "zoom to an interval"],
+  ["+ − 0", "zoom, whole flight"], ["← →", "move, or step through a focused row"]];
+document.getElementById("footer").append(make("p", { class: "help" },
+  ...keys.flatMap(([key, does]) => [make("kbd", {}, key), ` ${does}   `])), make("p", {}, `Made by ${DATA.by}. `
+  + "UNKNOWN is not FALSE: it was not told. The status informs; it is no safety function."));
+
+document.addEventListener("keydown", (event) => {
+  if (!active || event.ctrlKey || event.metaKey || event.altKey || event.target.closest("button, summary, a")) return;
+  const closer = () => active.zoom(0.5), farther = () => active.zoom(2);
+  const acts = { "+": closer, "=": closer, "-": farther, _: farther, 0: () => active.show(0, active.clock.length), ArrowLeft: () => active.pan(-0.2), ArrowRight: () => active.pan(0.2) };
+  if (!acts[event.key]) return;
+  event.preventDefault();
+  acts[event.key]();
+});
+
+const resized = new ResizeObserver(() => logs.forEach((log) => log.redraw()));
+logs.forEach((log) => { resized.observe(log.utc.plot); log.redrawNow(); });
+matchMedia("print").addEventListener("change", () => logs.forEach((log) => log.redrawNow()));
+const views = new Map();
+addEventListener("beforeprint", () => { // paper shows the whole flight
+  for (const log of logs) {
+    views.set(log, [log.from, log.to]);
+    log.from = 0;
+    log.to = log.clock.length;
+    log.redrawNow();
+  }
+});
+addEventListener("afterprint", () => views.forEach(([from, to], log) => log.show(from, to)));

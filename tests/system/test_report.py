@@ -1,0 +1,239 @@
+"""`report` through the installed command: totals of flights whose story is known, and a page that is safe to open."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_robot_status.mavlink.definitions import Heartbeat, Statustext
+from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.views.timeline import TRACKS
+from tests.docs.documents import table
+
+from .gateway_process import COMMAND, run
+
+ROOT = Path(__file__).parents[2]
+LOGS = ROOT / "tests" / "recorded" / "logs"
+START_US = 1_800_000_000_000_000
+ATTACK = "<script>alert(1)</script>"
+
+
+def reported(*arguments: str) -> list[dict[str, Any]]:
+    done = run("report", "-q", *arguments, "--as-json")
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def beats(*messages: tuple[float, Any], system: int = 1) -> bytes:
+    """Messages at these seconds, as a recorded log."""
+    return b"".join(
+        round(START_US + at * 1e6).to_bytes(8, "big") + encode(message, system=system, component=1, sequence=n & 255)
+        for n, (at, message) in enumerate(messages)
+    )
+
+
+def heartbeats(start: float, end: float, base_mode: int = 65) -> list[tuple[float, Any]]:
+    return [(start + n / 2, Heartbeat(4, 10, 3, base_mode, 4, 3)) for n in range(round((end - start) * 2))]
+
+
+def data_of(page: Path) -> dict[str, Any]:
+    (text,) = re.findall(r'id="data">(.*?)</script>', page.read_text("utf-8"), re.DOTALL)
+    data: dict[str, Any] = json.loads(text)
+    return data
+
+
+# -- what it adds up to ------------------------------------------------------------------------------------------------
+
+
+def test_the_demos_story_adds_up(demo_log: Path) -> None:
+    (found,) = reported(str(demo_log))
+    totals = found["totals"]
+    assert totals["arm_cycles"] == 1
+    assert totals["armed"]["TRUE"] == pytest.approx(18, abs=1)  # armed at 8.5 s, disarmed at 26.5 s
+    assert totals["e_stopped"]["TRUE"] == pytest.approx(2, abs=1)  # from 20.5 s to 22.5 s
+    assert totals["link"]["LOST"] == pytest.approx(5 - 3.5, abs=1.5)  # silent from 27.5 s to 32.5 s
+    assert [error["name"] for error in totals["errors"]][:2] == ["CRASH", "RC_LOST"]
+    assert "Radio Failsafe" in totals["errors"][1]["texts"]
+    for name in ("link", "armed", "mode", *TRACKS[3:]):
+        assert sum(totals[name].values()) == pytest.approx(totals["seconds"], abs=1e-4)
+
+
+def test_a_silence_of_the_link_is_a_gap_in_what_is_known() -> None:
+    (found,) = reported(str(LOGS / "ardurover-4.5.6-link-silence.tlog"))
+    lost = [interval for interval in found["intervals"]["link"] if interval["value"] == "LOST"]
+    assert lost
+    for interval in lost:
+        for field in TRACKS[4:]:
+            during = [
+                i["value"]
+                for i in found["intervals"][field]
+                if i["start"] < interval["end"] and i["end"] > interval["start"]
+            ]
+            assert during == [None], field
+
+
+def test_a_clock_that_is_set_begins_a_segment_and_counts_for_nothing(tmp_path: Path) -> None:
+    log = tmp_path / "jump.tlog"
+    log.write_bytes(beats(*heartbeats(0, 10)) + beats(*heartbeats(-7200, -7190)))
+    (found,) = reported(str(log))
+    assert [segment["start"][:19] for segment in found["segments"]] == ["2027-01-15T08:00:00", "2027-01-15T06:00:00"]
+    assert found["totals"]["seconds"] == pytest.approx(19, abs=0.6)
+    assert found["totals"]["link"]["LOST"] == 0
+    assert len(found["intervals"]["link"]) >= 2
+
+
+def test_every_vehicle_of_every_log_is_told(tmp_path: Path, demo_log: Path) -> None:
+    two = tmp_path / "two.tlog"
+    two.write_bytes(beats(*heartbeats(0, 5)) + beats(*heartbeats(5, 10), system=7))
+    found = reported(str(demo_log), str(two))
+    assert [(one["log"], one["system"]) for one in found] == [("demo.tlog", 1), ("two.tlog", 1), ("two.tlog", 7)]
+    assert [one["system"] for one in reported(str(two), "--system", "7")] == [7]
+
+
+# -- the page ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_page_is_written_beside_and_its_name_is_printed(tmp_path: Path, demo_log: Path) -> None:
+    done = run("report", "-q", str(demo_log), cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "demo.html\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["demo.html"]
+    (log,) = data_of(tmp_path / "demo.html")["logs"]
+    assert len(log["vehicles"]) == 1
+    assert (tmp_path / "demo.html").stat().st_size < 100_000
+
+
+def test_with_as_json_a_page_is_written_only_if_it_is_asked_for(tmp_path: Path, demo_log: Path) -> None:
+    assert json.loads(run("report", "-q", str(demo_log), "--as-json", cwd=tmp_path).stdout)["log"] == "demo.tlog"
+    assert not list(tmp_path.iterdir())
+    done = run("report", "-q", str(demo_log), "--as-json", "-o", "a.html", cwd=tmp_path)
+    assert json.loads(done.stdout)["log"] == "demo.tlog"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
+
+
+def test_a_text_that_is_a_script_stays_a_text(tmp_path: Path) -> None:
+    log, page = tmp_path / "<b>&.tlog", tmp_path / "page.html"
+    armed = heartbeats(0, 10, base_mode=193)
+    log.write_bytes(beats(*armed[:10], (5.0, Statustext(2, ATTACK.encode(), 0, 0)), *armed[11:]))
+    assert run("report", "-q", str(log), "-o", str(page)).returncode == 0
+    text = page.read_text("utf-8")
+    assert text.count("<script") == 2
+    assert ATTACK not in text
+    assert "<b>" not in text
+    (found,) = data_of(page)["logs"]
+    assert found["name"] == "<b>&.tlog"
+    assert ATTACK in found["strings"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        ((), 2, "required: LOG"),
+        (("nowhere.tlog",), 2, "cannot read the log"),
+        (("{log}", "-o", "{log}"), 2, "is no .html file, so it is not overwritten"),
+        (("{log}", "-o", "nowhere/a.html"), 1, "cannot write the report"),
+        (("{gcs}",), 1, "no autopilot was heard, so there is nothing to show"),
+        (("{text}",), 2, "is not a recorded log"),
+    ],
+)
+def test_what_cannot_be_is_told_in_a_line(
+    tmp_path: Path, demo_log: Path, arguments: tuple[str, ...], code: int, message: str
+) -> None:
+    gcs, text = tmp_path / "gcs.tlog", tmp_path / "text.tlog"
+    gcs.write_bytes(beats((0, Heartbeat(0, 6, 8, 192, 4, 3)), system=255))
+    text.write_text("no log at all " * 9)
+    before = demo_log.read_bytes()
+    done = run("report", "-q", *(a.format(log=demo_log, gcs=gcs, text=text) for a in arguments), cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert message in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+    assert demo_log.read_bytes() == before
+
+
+def test_on_a_terminal_it_tells_how_far_it_is(tmp_path: Path, demo_log: Path) -> None:
+    ours, theirs = pty.openpty()
+    try:
+        command = [*COMMAND, "report", "-q", str(demo_log)]
+        done = subprocess.run(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=theirs, timeout=30, check=True)
+        seen = os.read(ours, 1 << 16).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert done.stdout == b"demo.html\n"
+    assert "reading demo.tlog  [" in seen
+    assert "100 %" in seen
+
+
+# -- in a browser ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def opened(tmp_path: Path) -> Callable[[Path], str]:
+    """What a page has become once a browser has run it."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no Chromium is installed")
+    profile = f"--user-data-dir={tmp_path / 'profile'}"
+    quiet = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
+    command = [browser, *quiet.split(), "--disable-component-update", "--disable-sync", profile]
+
+    def browse(page: Path) -> str:
+        done = subprocess.run(
+            [*command, "--virtual-time-budget=3000", "--dump-dom", page.as_uri()],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=True,
+        )
+        return done.stdout
+
+    return browse
+
+
+def test_a_browser_draws_a_row_for_each_field_and_reason(
+    tmp_path: Path, demo_log: Path, opened: Callable[[Path], str]
+) -> None:
+    page = tmp_path / "demo.html"
+    run("report", "-q", str(demo_log), "-o", str(page))
+    (found,) = reported(str(demo_log))
+    shown = opened(page)
+    reasons = len(found["totals"]["errors"]) + len(found["totals"]["inhibits"])
+    assert shown.count('aria-roledescription="timeline"') == len(TRACKS) + reasons
+    for kind in ("unknown", "lost", "alarm", "stop", "off", "on"):
+        assert f'<rect class="{kind}"' in shown, kind
+    for words in ("2001 RC_LOST", "Crash: Going to HOLD", "TRUE, cycle 1", "in_error: FALSE → TRUE", "LINK_STALE ends"):
+        assert words in shown, words
+
+
+def test_a_browser_runs_nothing_that_came_from_the_wire(tmp_path: Path, opened: Callable[[Path], str]) -> None:
+    log, page = tmp_path / "attack.tlog", tmp_path / "attack.html"
+    armed = heartbeats(0, 10, base_mode=193)
+    image = Statustext(2, b"<img src=x onerror=document.title=1>", 0, 0)
+    attack = Statustext(2, ATTACK.encode(), 0, 0)
+    log.write_bytes(beats(*armed[:6], (3.0, attack), *armed[7:14], (7.0, image), *armed[15:]))
+    run("report", "-q", str(log), "-o", str(page))
+    shown = opened(page)
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in shown
+    assert "&lt;img src=x onerror=document.title=1&gt;" in shown
+    assert "<img" not in shown
+    assert shown.count("<script") == 2
+    assert "<title>attack.tlog" in shown
+
+
+# -- the document ------------------------------------------------------------------------------------------------------
+
+
+def test_the_document_shows_the_form_and_the_figures() -> None:
+    text = (ROOT / "docs" / "report.md").read_text("utf-8")
+    (log,) = re.findall(r"`(tests/recorded/logs/\S+\.tlog)`", text)
+    (found,) = reported(str(ROOT / log))
+    assert json.loads(text.partition("```text\n")[2].partition("```")[0]) == found["totals"]
+    assert [row[0] for row in table("docs/report.md", "member")] == list(found)

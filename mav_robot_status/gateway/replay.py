@@ -51,17 +51,19 @@ def run_through(plant: Plant, recording: Iterable[Stamped]) -> Iterator[tuple[In
     """Feed a recording to the plant; gives each instant after the plant has lived it."""
     last: Instant | None = None
     due = math.inf
+    hw = plant.hw
     for now, frame, new_segment in recording:
+        mono = now.mono
         if last is not None and new_segment:
             plant.forget(last)
-        elif last is not None and due < now.mono:
+        elif last is not None and (due < mono or hw.deadline < mono):
             live_through(plant, last, now)
-            due = plant.next_due(now.mono)
+            due = plant.next_due(mono)
         if frame is not None:
-            plant.take(frame, now)
-            if plant.hw.stirred:
+            hw.take(frame, now)
+            if hw.stirred:
                 plant.tick(now)
-                due = plant.next_due(now.mono)
+                due = plant.next_due(mono)
         last = now
         yield now, frame
 

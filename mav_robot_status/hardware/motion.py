@@ -5,6 +5,7 @@ The measured part is a value that each sample replaces; the last sample holds un
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..interface.status import TriState
@@ -39,6 +40,15 @@ def settle(motion: Motion, now: float) -> Motion:
     if motion.slow_since is not None and now >= motion.slow_since + SUSTAIN_OFF:
         return motion if motion.value is TriState.FALSE else motion._replace(value=TriState.FALSE)
     return motion
+
+
+def settles_at(motion: Motion) -> float:
+    """When (monotonic seconds) `settle` will find another value if no sample comes; infinity: never."""
+    if motion.fast_since is not None:
+        return math.inf if motion.value is TriState.TRUE else motion.fast_since + SUSTAIN_ON
+    if motion.slow_since is not None and motion.value is not TriState.FALSE:
+        return motion.slow_since + SUSTAIN_OFF
+    return math.inf
 
 
 def moved(

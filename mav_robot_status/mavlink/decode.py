@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from .definitions import MESSAGES
 
 if TYPE_CHECKING:
     from .framing import Frame
+
+
+new: Final = tuple.__new__  # a NamedTuple of just as many values as it has fields, four times as fast as by its name
 
 
 def decode(frame: Frame) -> Any:
@@ -19,8 +22,11 @@ def decode(frame: Frame) -> Any:
     definition = MESSAGES.get(frame.message_id)
     if definition is None:
         return None
-    size = definition.layout.size
-    return definition.type._make(definition.layout.unpack(frame.payload[:size].ljust(size, b"\0")))
+    layout, payload = definition.layout, frame.payload
+    size = layout.size
+    if len(payload) != size:
+        payload = payload[:size].ljust(size, b"\0")
+    return new(definition.type, layout.unpack(payload))
 
 
 def text(raw: bytes) -> str:

@@ -11,7 +11,6 @@ from ...mavlink import definitions as mav
 from .. import boot as boot_rules
 from .. import estop, motion, outputs, sensors
 from ..identity import SURFACE_BOAT, Family, Stack
-from ..memory import observed
 from ..observation import Heard, heard, is_fresh
 from .beats import rebooted
 
@@ -25,75 +24,71 @@ FIX_3D: Final = 3  # GPS_FIX_TYPE
 NO_SPEED: Final = 0xFFFF  # GPS_RAW_INT.vel
 
 
-def extended_sys_state(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
+def extended_sys_state(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:
     """EXTENDED_SYS_STATE: the landed state."""
-    return observed(memory, extended_sys_state=heard(message, now.mono, memory.observation.extended_sys_state))
+    seen = memory.observation
+    seen.extended_sys_state = heard(message, now.mono, seen.extended_sys_state)
 
 
-def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions) -> Memory:
+def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions) -> None:
     """GLOBAL_POSITION_INT: the first choice for speed."""
-    memory, boot = _clock(memory, message.time_boot_ms, now)
-    position = heard(message, now.mono, memory.observation.global_position)
+    _clock(memory, message.time_boot_ms, now)
+    seen = memory.observation
+    seen.global_position = heard(message, now.mono, seen.global_position)
     velocity = message.vx / 100, message.vy / 100, message.vz / 100
     speed = _speed(memory, velocity, not any(velocity), message.lat == 0 and message.lon == 0)
-    return memory._replace(
-        boot=boot,
-        observation=memory.observation._replace(global_position=position),
-        motion=_moved(memory, memory.motion, speed, now, options),
-    )
+    memory.motion = _moved(memory, memory.motion, speed, now, options)
 
 
-def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> Memory:
+def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> None:
     """LOCAL_POSITION_NED: the speed while no global position is fresh."""
-    memory, boot = _clock(memory, message.time_boot_ms, now)
-    moving = memory.motion
-    if not is_fresh(memory.observation.global_position, now.mono, motion.FRESH):
+    _clock(memory, message.time_boot_ms, now)
+    seen = memory.observation
+    seen.local_position = heard(message, now.mono, seen.local_position)
+    if not is_fresh(seen.global_position, now.mono, motion.FRESH):
         velocity = message.vx, message.vy, message.vz
-        moving = _moved(memory, moving, _speed(memory, velocity, not any(velocity)), now, options)
-    position = heard(message, now.mono, memory.observation.local_position)
-    return memory._replace(boot=boot, observation=memory.observation._replace(local_position=position), motion=moving)
+        speed = _speed(memory, velocity, not any(velocity))
+        memory.motion = _moved(memory, memory.motion, speed, now, options)
 
 
-def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> Memory:
+def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> None:
     """VFR_HUD: the last choice for speed; the throttle for the output watch."""
-    before = memory.observation
-    observation = before._replace(vfr_hud=heard(message, now.mono, before.vfr_hud))
-    if is_fresh(before.global_position, now.mono, motion.FRESH) or is_fresh(
-        before.local_position, now.mono, motion.FRESH
-    ):
-        return memory._replace(observation=observation)
+    seen = memory.observation
+    seen.vfr_hud = heard(message, now.mono, seen.vfr_hud)
+    if is_fresh(seen.global_position, now.mono, motion.FRESH) or is_fresh(seen.local_position, now.mono, motion.FRESH):
+        return
     still = message.groundspeed == 0  # whatever the climb, which comes from the barometer
     speed = _speed(memory, (message.groundspeed, 0.0, message.climb), still)
-    return memory._replace(observation=observation, motion=_moved(memory, memory.motion, speed, now, options))
+    memory.motion = _moved(memory, memory.motion, speed, now, options)
 
 
-def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> Memory:
+def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> None:
     """GPS_RAW_INT: whether the receiver itself stands still."""
     if message.fix_type < FIX_3D or message.vel == NO_SPEED:
-        return memory._replace(gps_motion=motion.UNKNOWN)
-    return memory._replace(
-        observation=memory.observation._replace(gps=heard(message, now.mono, memory.observation.gps)),
-        gps_motion=_moved(memory, memory.gps_motion, message.vel / 100, now, options),
-    )
+        memory.gps_motion = motion.UNKNOWN
+        return
+    seen = memory.observation
+    seen.gps = heard(message, now.mono, seen.gps)
+    memory.gps_motion = _moved(memory, memory.gps_motion, message.vel / 100, now, options)
 
 
-def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> Memory:
+def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> None:
     """ATTITUDE: rotation."""
-    memory, boot = _clock(memory, message.time_boot_ms, now)
-    rotating = heard(message, now.mono, memory.observation.attitude)
-    return memory._replace(boot=boot, observation=memory.observation._replace(attitude=rotating))
+    _clock(memory, message.time_boot_ms, now)
+    seen = memory.observation
+    seen.attitude = heard(message, now.mono, seen.attitude)
 
 
-def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> Memory:
+def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
     """SYSTEM_TIME: the autopilot's clock."""
-    memory, boot = _clock(memory, message.time_boot_ms, now)
-    return memory._replace(boot=boot)
+    _clock(memory, message.time_boot_ms, now)
 
 
-def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> tuple[Memory, boot_rules.Boot]:
-    """The boot as this clock tells it, and the memory: begun anew if the clock shows a reboot."""
-    boot, anew = boot_rules.heard_clock(memory.boot, time_boot_ms, now.mono)
-    return (rebooted(memory, boot, now) if anew else memory), boot
+def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> None:
+    """The boot as this clock tells it; the memory is begun anew if the clock shows a reboot."""
+    memory.boot, anew = boot_rules.heard_clock(memory.boot, time_boot_ms, now.mono)
+    if anew:
+        rebooted(memory, memory.boot, now)
 
 
 def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, nowhere: bool = False) -> float | None:
@@ -153,48 +148,46 @@ def driving_speed(memory: Memory) -> float:
     return speed if math.isfinite(speed) else 0.0
 
 
-def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, options: HardwareOptions) -> Memory:
+def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, options: HardwareOptions) -> None:
     """SERVO_OUTPUT_RAW: the output watch of ArduPilot."""
     if memory.stack is not Stack.ARDUPILOT or not options.watch_outputs or message.port != 0:
-        return memory
+        return
     hud = memory.observation.vfr_hud
     throttle = hud.message.throttle if hud is not None and is_fresh(hud, now.mono, motion.FRESH) else None
     values = (*message[1:9], *message[10:18])
-    watch = outputs.heard_outputs(
+    memory.watch = outputs.heard_outputs(
         memory.watch, values, memory.vehicle_type, memory.pulse, throttle, driving_speed(memory), now.mono
     )
-    stop = memory.stop
-    if watch.driven and stop.said is TriState.TRUE:
-        stop = estop.NOTHING  # a motor that is driven is not stopped, whatever was said before
-    return memory._replace(watch=watch, stop=stop)
+    if memory.watch.driven and memory.stop.said is TriState.TRUE:
+        memory.stop = estop.NOTHING  # a motor that is driven is not stopped, whatever was said before
 
 
-def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: HardwareOptions) -> Memory:
+def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: HardwareOptions) -> None:
     """PARAM_VALUE: SERVOn_FUNCTION says which outputs drive motors."""
     name = message.param_id.split(b"\0")[0]
     number, value = name[5:-9], message.param_value
     if not (name.startswith(b"SERVO") and name.endswith(b"_FUNCTION") and number.isdigit() and math.isfinite(value)):
-        return memory
+        return
     channel = int(number)
     if not 1 <= channel <= 32 or memory.stack is not Stack.ARDUPILOT:
-        return memory
+        return
     watch = memory.watch
-    return memory._replace(watch=watch._replace(functions={**watch.functions, channel: int(value)}))
+    memory.watch = watch._replace(functions={**watch.functions, channel: int(value)})
 
 
-def esc_telemetry(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
+def esc_telemetry(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:
     """ESC_TELEMETRY_n (ArduPilot): four motors."""
-    return _turning(memory, message, unpack("<4H", message.rpm), now)
+    _turning(memory, message, unpack("<4H", message.rpm), now)
 
 
-def esc_status(memory: Memory, message: mav.EscStatus, now: Instant, options: HardwareOptions) -> Memory:
+def esc_status(memory: Memory, message: mav.EscStatus, now: Instant, options: HardwareOptions) -> None:
     """ESC_STATUS (PX4): four motors."""
-    return _turning(memory, message, unpack("<4i", message.rpm), now)
+    _turning(memory, message, unpack("<4i", message.rpm), now)
 
 
-def _turning(memory: Memory, message: Any, rpm: tuple[int, ...], now: Instant) -> Memory:
-    before = memory.observation.esc
-    if not any(rpm):
-        over = before is not None and type(before.message) is type(message)
-        return memory._replace(observation=memory.observation._replace(esc=None)) if over else memory
-    return observed(memory, esc=heard(message, now.mono, memory.observation.esc))
+def _turning(memory: Memory, message: Any, rpm: tuple[int, ...], now: Instant) -> None:
+    seen = memory.observation
+    if any(rpm):
+        seen.esc = heard(message, now.mono, seen.esc)
+    elif seen.esc is not None and type(seen.esc.message) is type(message):
+        seen.esc = None

@@ -25,21 +25,20 @@ if TYPE_CHECKING:
 
 
 def _of_clock(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
-    """What any clock of the autopilot can change: it dates its boot better all the time, and faults wait for that."""
-    return memory.boots, memory.boot.at if memory.faults else None
+    """Every clock dates the boot a little better; only faults wait for that."""
+    return memory.boots, memory.faults and memory.boot.at
 
 
 def _of_attitude(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     seen = memory.observation.attitude
-    return memory.boots, memory.boot.at if memory.faults else None, seen is not None and seen.since
+    return seen and seen.since, memory.faults and memory.boot.at
 
 
 def _of_global_position(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     moving, seen = memory.motion, memory.observation.global_position
     return (
-        memory.boots,
-        memory.boot.at if memory.faults else None,
-        seen is not None and seen.since,
+        seen and seen.since,
+        memory.faults and memory.boot.at,
         moving.value,
         moving.slow_since is None,
         moving.speed is None,
@@ -50,9 +49,8 @@ def _of_global_position(memory: Memory, options: HardwareOptions) -> tuple[objec
 def _of_local_position(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     moving, seen = memory.motion, memory.observation.local_position
     return (
-        memory.boots,
-        memory.boot.at if memory.faults else None,
-        seen is not None and seen.since,
+        seen and seen.since,
+        memory.faults and memory.boot.at,
         moving.value,
         moving.slow_since is None,
         moving.speed is None,
@@ -62,7 +60,7 @@ def _of_local_position(memory: Memory, options: HardwareOptions) -> tuple[object
 def _of_vfr_hud(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     moving, seen, watch = memory.motion, memory.observation.vfr_hud, memory.watch
     return (
-        seen is not None and seen.since,
+        seen and seen.since,
         moving.value,
         moving.slow_since is None,
         moving.speed is None,
@@ -71,8 +69,8 @@ def _of_vfr_hud(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
 
 
 def _of_gps(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
-    moving, seen = memory.gps_motion, memory.observation.gps
-    return seen is not None and seen.since, moving.value
+    seen = memory.observation.gps
+    return seen and seen.since, memory.gps_motion.value
 
 
 def _of_outputs(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
@@ -80,15 +78,28 @@ def _of_outputs(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     return (
         watch.driven,
         watch.held_since,
-        memory.observation.esc is not None and outputs.is_at_stop(watch, memory.vehicle_type),
+        memory.observation.esc and outputs.is_at_stop(watch, memory.vehicle_type),
         memory.stop.said,  # ended by a motor that is driven
+    )
+
+
+def _of_heartbeat(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    """A heartbeat like the last one, in time, only lets time pass, and confirms the outputs at rest."""
+    seen = memory.observation.heartbeat
+    return (
+        seen and (seen.since, seen.message),
+        memory.latches.keys(),
+        memory.not_ready,
+        memory.failsafe,
+        memory.stop,
+        memory.observation.esc and outputs.is_at_stop(memory.watch, memory.vehicle_type),
     )
 
 
 def _of_sys_status(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     seen = memory.observation.sys_status
     return (
-        seen is not None and (seen.since, seen.message[:3]),
+        seen and (seen.since, seen.message[:3]),
         memory.faults and [(bit, fault.messages >= sensors.DEBOUNCE_MESSAGES) for bit, fault in memory.faults.items()],
         memory.stop.said,
         memory.stop.ready >= estop.READY_MESSAGES,
@@ -104,11 +115,9 @@ def _of_the_rest(memory: Memory, options: HardwareOptions) -> tuple[object, ...]
     """What the vehicle says of itself, and the streams of which a message in PARTS is none."""
     seen = memory.observation
     return (
-        seen.heartbeat and seen.heartbeat.message,
         seen.extended_sys_state and seen.extended_sys_state.message,
         seen.current_mode and seen.current_mode.message,
         [heard.since for heard in seen if heard is not None],
-        memory.gps_motion.speed is None,
         memory.stop.text,
         [(code, latch.text) for code, latch in memory.latches.items()],
         memory.failsafe,
@@ -121,7 +130,9 @@ PARTS: Final[Mapping[type, Part]] = {
     mav.Attitude: _of_attitude,
     mav.GlobalPositionInt: _of_global_position,
     mav.GpsRawInt: _of_gps,
+    mav.Heartbeat: _of_heartbeat,
     mav.LocalPositionNed: _of_local_position,
+    mav.ParamValue: _of_outputs,
     mav.ServoOutputRaw: _of_outputs,
     mav.SysStatus: _of_sys_status,
     mav.SystemTime: _of_clock,
@@ -145,7 +156,7 @@ def may_matter(memory: Memory, message: object, before: Matters, options: Hardwa
     """Whether `message`, just heard, changed something that matters since `before`."""
     kind = type(message)
     part = PARTS.get(kind)
-    return matters(memory, options) != before if part is None else part(memory, options) != before[kind]
+    return part(memory, options) != before[kind] if part is not None else matters(memory, options) != before
 
 
 def settles_at(memory: Memory, message: object) -> float:

@@ -50,7 +50,9 @@ class Memory:
     motion: Motion = STILL_UNKNOWN
     gps_motion: Motion = STILL_UNKNOWN
     """What the receiver's own ground speed says; only used while the autopilot has no estimate."""
-    watch: outputs.Watch = outputs.NOT_WATCHED
+    turning: float = 0.0
+    """The rotation that the latest ATTITUDE tells, rad/s."""
+    watch: outputs.Watch = field(default_factory=outputs.Watch)
     texts: statustext.Assembly = statustext.EMPTY
     modes: Mapping[int, AvailableMode] = field(default_factory=dict)
     not_ready: Said | None = None

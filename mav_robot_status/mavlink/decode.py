@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .framing import Frame
 
 
+READERS: Final = {d.id: (d.type, d.layout.size, d.layout.unpack) for d in MESSAGES.values()}
 new: Final = tuple.__new__  # a NamedTuple of just as many values as it has fields, four times as fast as by its name
 
 
@@ -19,14 +20,14 @@ def decode(frame: Frame) -> Any:
     A payload that MAVLink 2 trimmed, or that an older definition without the extension fields made shorter, is filled
     up with zeros; bytes beyond the layout (a newer definition) are ignored. Never raises.
     """
-    definition = MESSAGES.get(frame.message_id)
-    if definition is None:
+    reader = READERS.get(frame.message_id)
+    if reader is None:
         return None
-    layout, payload = definition.layout, frame.payload
-    size = layout.size
+    kind, size, unpack = reader
+    payload = frame.payload
     if len(payload) != size:
         payload = payload[:size].ljust(size, b"\0")
-    return new(definition.type, layout.unpack(payload))
+    return new(kind, unpack(payload))
 
 
 def text(raw: bytes) -> str:

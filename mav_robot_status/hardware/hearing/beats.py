@@ -37,7 +37,7 @@ def heartbeat(memory: Memory, message: Heartbeat, now: Instant, options: Hardwar
     connected = now.mono - last <= options.heartbeat_timeout
     pulse = memory.pulse = next_beat(before, message, now, connected)
     enabled = _outputs_enabled(memory)
-    memory.watch = outputs.heard_beat(memory.watch, pulse, before, enabled, memory.vehicle_type, now.mono)
+    outputs.heard_beat(memory.watch, pulse, before, enabled, memory.vehicle_type, now.mono)
     seen = memory.observation
     previous: Heartbeat = seen.heartbeat.message if seen.heartbeat else message
     seen.heartbeat = heard(message, now.mono, seen.heartbeat)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...interface.status import TriState
 from ...mavlink import definitions as mav
-from .. import boot as boot_rules
 from .. import estop, motion, outputs, sensors
+from ..boot import heard_clock
 from ..identity import SURFACE_BOAT, Family, Stack
 from ..observation import Heard, heard, is_fresh
 from .beats import rebooted
@@ -77,6 +77,8 @@ def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: Hardw
     _clock(memory, message.time_boot_ms, now)
     seen = memory.observation
     seen.attitude = heard(message, now.mono, seen.attitude)
+    boat = memory.vehicle_type == SURFACE_BOAT  # they always roll
+    memory.turning = fastest((message.yawspeed,) if boat else message[4:])
 
 
 def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
@@ -86,8 +88,7 @@ def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: 
 
 def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> None:
     """The boot as this clock tells it; the memory is begun anew if the clock shows a reboot."""
-    memory.boot, anew = boot_rules.heard_clock(memory.boot, time_boot_ms, now.mono)
-    if anew:
+    if heard_clock(memory.boot, time_boot_ms, now.mono):
         rebooted(memory, memory.boot, now)
 
 
@@ -97,7 +98,7 @@ def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, no
     ArduPilot sends exactly zero (and its last position) when it has none, and up to 6 m/s at rest while its estimator
     is unhealthy; INAV sends zero without GPS.
     """
-    if not all(map(math.isfinite, velocity)):
+    if not math.isfinite(sum(velocity)):
         return None
     status = memory.observation.sys_status
     if memory.stack is Stack.ARDUPILOT:
@@ -116,21 +117,19 @@ def _has_gps(status: Heard | None) -> bool:
     )
 
 
-def rotation(memory: Memory, now: float) -> float:
-    """Rotation in rad/s: about the vertical for boats, which always roll; 0 while not freshly heard."""
-    attitude = memory.observation.attitude
-    if attitude is None or not is_fresh(attitude, now, motion.FRESH):
-        return 0.0
-    m: mav.Attitude = attitude.message
-    rates = (m.yawspeed,) if memory.vehicle_type == SURFACE_BOAT else (m.rollspeed, m.pitchspeed, m.yawspeed)
-    return max([abs(rate) for rate in rates if math.isfinite(rate)], default=0.0)
+def fastest(rates: tuple[float, ...]) -> float:
+    """The greatest of some rates, whatever their signs; those that are no numbers do not count."""
+    if not math.isfinite(sum(rates)):
+        rates = tuple(rate for rate in rates if math.isfinite(rate))
+    return max(map(abs, rates), default=0.0)
 
 
 def _moved(
     memory: Memory, before: motion.Motion, speed: float | None, now: Instant, options: HardwareOptions
 ) -> motion.Motion:
     """A motion after one more sample of speed."""
-    return motion.moved(before, speed, rotation(memory, now.mono), memory.pulse.armed, options, now.mono)
+    rotation = memory.turning if is_fresh(memory.observation.attitude, now.mono, motion.FRESH) else 0.0
+    return motion.moved(before, speed, rotation, memory.pulse.armed, options, now.mono)
 
 
 def speed_over_ground(memory: Memory) -> float:
@@ -155,7 +154,7 @@ def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, 
     hud = memory.observation.vfr_hud
     throttle = hud.message.throttle if hud is not None and is_fresh(hud, now.mono, motion.FRESH) else None
     values = (*message[1:9], *message[10:18])
-    memory.watch = outputs.heard_outputs(
+    outputs.heard_outputs(
         memory.watch, values, memory.vehicle_type, memory.pulse, throttle, driving_speed(memory), now.mono
     )
     if memory.watch.driven and memory.stop.said is TriState.TRUE:
@@ -171,8 +170,7 @@ def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: 
     channel = int(number)
     if not 1 <= channel <= 32 or memory.stack is not Stack.ARDUPILOT:
         return
-    watch = memory.watch
-    memory.watch = watch._replace(functions={**watch.functions, channel: int(value)})
+    memory.watch.name({**memory.watch.functions, channel: int(value)})
 
 
 def esc_telemetry(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:

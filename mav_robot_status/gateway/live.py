@@ -185,7 +185,7 @@ class Live:
                     station.send(frame)
 
     def _next_due(self, now: float) -> float:
-        due = min(self.plant.next_due(now), self._told_at)
+        due = min(self.plant.next_due(now, now + LONGEST_WAIT), self._told_at)
         return min(due, self._beat_at + HEARTBEAT_PERIOD) if self._config.identity.heartbeat else due
 
     def _tell_silence(self, now: Instant) -> None:

@@ -120,9 +120,12 @@ class Plant:
             if again is not None:
                 self._service_due = min(self._service_due, again)
 
-    def next_due(self, now: float) -> float:
-        """When (monotonic seconds) `tick` has something to do, if no frame arrives before."""
-        due = min(self.hw.next_due(), self._service_due)
+    def next_due(self, now: float, until: float = -math.inf) -> float:
+        """When (monotonic seconds) `tick` has something to do, if no frame arrives before.
+
+        `until` is handed to the hardware, see there.
+        """
+        due = min(self.hw.next_due(until), self._service_due)
         for post in self._posts:
             if post.running:
                 due = min(due, post.guard.call(math.inf, post.controller.next_due, now))
@@ -158,10 +161,9 @@ class Plant:
 
     def _attend(self) -> None:
         """Make the controllers of handles that have become known."""
-        names = self.hw.handles.get_names()
-        if len(names) == len(self._seen):
+        if len(self.hw.handles) == len(self._seen):
             return
-        for name in names:
+        for name in self.hw.handles.get_names():
             if name in self._seen:
                 continue
             self._seen.add(name)

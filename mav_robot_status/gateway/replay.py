@@ -57,7 +57,8 @@ def run_through(plant: Plant, recording: Iterable[Stamped]) -> Iterator[tuple[In
         if last is not None and new_segment:
             plant.forget(last)
         elif last is not None and (due < mono or hw.deadline < mono):
-            live_through(plant, last, now)
+            if plant.next_due(last.mono, mono) < mono:
+                live_through(plant, last, now)
             due = plant.next_due(mono)
         if frame is not None:
             hw.take(frame, now)

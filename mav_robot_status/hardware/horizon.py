@@ -89,9 +89,6 @@ def _of_heartbeat(memory: Memory, options: HardwareOptions) -> tuple[object, ...
     return (
         seen and (seen.since, seen.message),
         memory.latches.keys(),
-        memory.not_ready,
-        memory.failsafe,
-        memory.stop,
         memory.observation.esc and outputs.is_at_stop(memory.watch, memory.vehicle_type),
     )
 

@@ -170,15 +170,15 @@ class MavlinkRobotHW(RobotHW):
         if self._unheard:
             self._tell_unheard(now)
         if now.mono >= self.deadline:
+            self._look_again(now.mono)
             for tracked in self._tracked.values():
-                if now.mono >= tracked.deadline and not tracked.dirty and tracked.memory is not None:
-                    self._check_time(tracked, tracked.memory, now)
-        elif not self.stirred:
-            return
-        for tracked in self.stirred:
-            self._evaluate(tracked, now)
-        self.stirred.clear()
-        self.deadline = min((tracked.deadline for tracked in self._tracked.values()), default=math.inf)
+                if now.mono >= tracked.deadline and not tracked.dirty:
+                    self._stir(tracked)
+        if self.stirred:
+            for tracked in self.stirred:
+                self._evaluate(tracked, now)
+            self.stirred.clear()
+            self.deadline = min(tracked.deadline for tracked in self._tracked.values())
 
     def explain(self, now: Instant) -> None:
         """Bring the evidence in the handles up to `now`; `read` renews it only when a status may have changed."""
@@ -213,8 +213,13 @@ class MavlinkRobotHW(RobotHW):
         self._ask_anew = bool(asks)
         return asks
 
-    def next_due(self) -> float:
-        """When (monotonic seconds) `read` or `write` has something to do, if nothing arrives before."""
+    def next_due(self, until: float = -math.inf) -> float:
+        """When (monotonic seconds) `read` or `write` has something to do, if nothing arrives before.
+
+        What falls due before `until` does so in fact; later, it may turn out that nothing has ended by then.
+        """
+        if self.deadline < until:
+            self._look_again(until)
         return min(self.deadline, self._asks_due)
 
     def forget(self) -> None:
@@ -307,12 +312,12 @@ class MavlinkRobotHW(RobotHW):
         tracked.dirty = True
         self.stirred.append(tracked)
 
-    def _check_time(self, tracked: Tracked, memory: Memory, now: Instant) -> None:
-        """A deadline has come: has anything ended, or was all that it waited for heard again in time?"""
-        tracked.deadline = horizon.next_change(memory, tracked.checked, self.options)
-        tracked.checked = now.mono
-        if tracked.deadline <= now.mono:
-            self._stir(tracked)
+    def _look_again(self, until: float) -> None:
+        """Put off the deadlines up to `until` of vehicles of which what would have ended was heard again meanwhile."""
+        for tracked in self._tracked.values():
+            if tracked.deadline <= until and tracked.memory is not None:
+                tracked.deadline = horizon.next_change(tracked.memory, tracked.checked, self.options)
+        self.deadline = min(tracked.deadline for tracked in self._tracked.values())
 
     def _evaluate(self, tracked: Tracked, now: Instant) -> None:
         if tracked.memory is None or tracked.ids is None:

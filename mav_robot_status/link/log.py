@@ -27,6 +27,8 @@ STAMP_SIZE = 8
 
 T = TypeVar("T")
 
+new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
+
 
 @dataclass
 class Counts:
@@ -63,7 +65,7 @@ def timed(pieces: Iterable[Piece[T]], counts: Counts) -> Iterator[Stamped]:
     jumped = False
     for stamp, following, what in pieces:
         # Nearly every record is neither before the last one nor after the next one.
-        if not (0 <= stamp - latest <= DAY_US and stamp <= following):
+        if not (latest <= stamp <= following and stamp - latest <= DAY_US):
             if latest == _NEVER:
                 latest = segment = stamp
             elif _is_jump(latest, stamp, following):
@@ -78,7 +80,7 @@ def timed(pieces: Iterable[Piece[T]], counts: Counts) -> Iterator[Stamped]:
                 counts.held += 1
                 stamp = latest
         latest = stamp
-        yield Stamped(Instant(mono + (stamp - segment) * 1e-6, stamp), what, jumped)
+        yield new(Stamped, (new(Instant, (mono + (stamp - segment) * 1e-6, stamp)), what, jumped))
         jumped = False
 
 

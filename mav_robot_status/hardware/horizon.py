@@ -100,7 +100,7 @@ def _of_sys_status(memory: Memory, options: HardwareOptions) -> tuple[object, ..
         memory.faults and [(bit, fault.messages >= sensors.DEBOUNCE_MESSAGES) for bit, fault in memory.faults.items()],
         memory.stop.said,
         memory.stop.ready >= estop.READY_MESSAGES,
-        memory.latches.keys(),
+        len(memory.latches),
         memory.not_ready,
         memory.internal_errors_since,
         memory.rc_lost_since,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from ..interface.status import TriState
-from .identity import HELICOPTER, Family
+from .identity import HELICOPTER, ROVER, Family
 
 if TYPE_CHECKING:
     from .pulse import Pulse
@@ -101,11 +101,13 @@ def heard_outputs(
         watch.candidate, watch.driven, watch.held_since = values, False, None
         return
     motors, assumed = channels(watch, vehicle_type)
-    known = [(values[c - 1], watch.stop[c]) for c in motors if c in watch.stop and c <= len(values)]
-    off_stop = any(abs(value - stop) > OFF_STOP for value, stop in known)
-    at_stop = len(known) == len(motors) > 0 and all(abs(value - stop) <= AT_STOP for value, stop in known)
+    stop = watch.stop
+    known = [abs(values[c - 1] - stop[c]) for c in motors if c in stop and c <= len(values)]  # how far off it, us
+    complete = len(known) == len(motors)
+    off_stop = bool(known) and max(known) > OFF_STOP
+    at_stop = complete and bool(known) and max(known) <= AT_STOP
+    all_off = complete and len(known) >= SEVERAL and min(known) > OFF_STOP
     demanded = throttle is not None and throttle >= DEMAND
-    all_off = len(known) == len(motors) >= SEVERAL and all(abs(value - stop) > OFF_STOP for value, stop in known)
     watch.proved = watch.proved or (off_stop and demanded) or all_off
     if not (at_stop and demanded and watch.proved and watch.driven_seen):
         watch.held_since = None
@@ -145,7 +147,7 @@ def is_vetoed(watch: Watch, family: Family, speed: float) -> bool:
 
     A copter that is stopped falls, whatever it did before; a rover coasts.
     """
-    return speed - (watch.speed_then if family is Family.ROVER else 0.0) > GROWTH
+    return speed - (watch.speed_then if family is ROVER else 0.0) > GROWTH
 
 
 def verdict(watch: Watch, family: Family, vehicle_type: int, speed: float, now: float) -> TriState:

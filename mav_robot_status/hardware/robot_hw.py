@@ -26,7 +26,7 @@ from .derive import derive
 from .fields.inhibits import inhibit
 from .fields.view import named
 from .hearing import HANDLERS, hear, overheard, pass_time
-from .identity import Stack, is_autopilot
+from .identity import ARDUPILOT, is_autopilot
 from .memory import begin
 from .observation import SILENCE
 from .options import HardwareOptions
@@ -199,7 +199,7 @@ class MavlinkRobotHW(RobotHW):
             if tracked.requests is None:
                 tracked.requests = Requests(*ids, now.mono)
             wanted = wanted_of(memory.stack, memory.family, self.options.watch_outputs)
-            command = tracked.requests.due(now.mono, wanted, memory.stack is not Stack.ARDUPILOT)
+            command = tracked.requests.due(now.mono, wanted, memory.stack is not ARDUPILOT)
             if command is not None:
                 asks.append(Ask(*ids, command))
             elif OUTPUT_WATCH[0] in wanted:
@@ -297,10 +297,11 @@ class MavlinkRobotHW(RobotHW):
         return tracked
 
     def _hear(self, tracked: Tracked, memory: Memory, message: Any, now: Instant) -> None:
-        hear(memory, message, now, self.options)
+        options = self.options
+        hear(memory, message, now, options)
         if tracked.dirty:
             return
-        if self._hasty or horizon.may_matter(memory, message, tracked.seen, self.options):
+        if self._hasty or horizon.may_matter(memory, message, tracked.seen, options):
             self._stir(tracked)
         elif type(message) in horizon.SPEEDS:
             at = horizon.settles_at(memory, message)

@@ -7,7 +7,7 @@ from typing import Final
 from ...interface.status import Evidence
 from .. import motion
 from ..hearing.movement import speed_over_ground
-from ..identity import AIRCRAFT, Stack
+from ..identity import AIRCRAFT, ARDUPILOT
 from ..observation import is_fresh
 from .view import FALSE, STANDBY, TRUE, UNKNOWN, Finding, View
 
@@ -69,7 +69,7 @@ def _gps_contradicts(view: View) -> bool:
 
 def _on_ground(view: View) -> bool:
     """ArduPilot's STANDBY: its own land detector says landed."""
-    return view.memory.stack is Stack.ARDUPILOT and view.state == STANDBY
+    return view.memory.stack is ARDUPILOT and view.state == STANDBY
 
 
 def _velocity_source(view: View) -> tuple[str | None, float | None]:

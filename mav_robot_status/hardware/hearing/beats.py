@@ -9,7 +9,7 @@ from ...mavlink.definitions import Heartbeat
 from .. import boot as boot_rules
 from .. import causes, estop, motion, outputs, sensors
 from ..flight_mode import is_initialising
-from ..identity import Stack
+from ..identity import PX4
 from ..memory import Memory, begin
 from ..observation import Observation, heard
 from ..pulse import armed_before, next_beat
@@ -72,7 +72,7 @@ def _starts_anew(previous: Heartbeat, message: Heartbeat, memory: Memory) -> boo
     state, before = message.system_status, previous.system_status
     if state == BOOT and before >= STANDBY:
         return True
-    if state == UNINIT and before >= STANDBY and memory.stack is not Stack.PX4:
+    if state == UNINIT and before >= STANDBY and memory.stack is not PX4:
         return True
     starting = is_initialising(message, memory.stack, memory.family)
     return starting and not is_initialising(previous, memory.stack, memory.family)

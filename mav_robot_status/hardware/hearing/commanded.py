@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...mavlink.definitions import CommandAck, CommandInt, CommandLong
 from .. import causes, commands, estop
-from ..identity import Family, Stack
+from ..identity import ARDUPILOT, Family, Stack
 
 if TYPE_CHECKING:
     from ...clock import Instant
@@ -39,7 +39,7 @@ def command_ack(memory: Memory, message: CommandAck, now: Instant, options: Hard
         if asked.param1 >= 0.5 and memory.family in TERMINATES.get(memory.stack, frozenset()):
             memory.latches = causes.announce(memory.latches, 1002, None, now, source)
         return
-    honoured = memory.stack is Stack.ARDUPILOT and memory.family in estop.HONOURED_BY
+    honoured = memory.stack is ARDUPILOT and memory.family in estop.HONOURED_BY
     known = honoured and asked.param1 == commands.MOTOR_ESTOP
     if known and asked.param2 in (commands.LOW, commands.HIGH):
         memory.stop = estop.said(memory.stop, asked.param2 == commands.HIGH, None, now, source)

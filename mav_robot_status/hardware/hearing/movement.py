@@ -6,11 +6,10 @@ import math
 from struct import unpack
 from typing import TYPE_CHECKING, Any, Final
 
-from ...interface.status import TriState
 from ...mavlink import definitions as mav
 from .. import estop, motion, outputs, sensors
 from ..boot import heard_clock
-from ..identity import SURFACE_BOAT, Family, Stack
+from ..identity import ARDUPILOT, INAV, ROVER, SURFACE_BOAT
 from ..observation import Heard, heard, is_fresh
 from .beats import rebooted
 
@@ -32,7 +31,8 @@ def extended_sys_state(memory: Memory, message: Any, now: Instant, options: Hard
 
 def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions) -> None:
     """GLOBAL_POSITION_INT: the first choice for speed."""
-    _clock(memory, message.time_boot_ms, now)
+    if heard_clock(memory.boot, message.time_boot_ms, now.mono):
+        rebooted(memory, memory.boot, now)
     seen = memory.observation
     seen.global_position = heard(message, now.mono, seen.global_position)
     velocity = message.vx / 100, message.vy / 100, message.vz / 100
@@ -42,7 +42,8 @@ def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant
 
 def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> None:
     """LOCAL_POSITION_NED: the speed while no global position is fresh."""
-    _clock(memory, message.time_boot_ms, now)
+    if heard_clock(memory.boot, message.time_boot_ms, now.mono):
+        rebooted(memory, memory.boot, now)
     seen = memory.observation
     seen.local_position = heard(message, now.mono, seen.local_position)
     if not is_fresh(seen.global_position, now.mono, motion.FRESH):
@@ -74,21 +75,19 @@ def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: H
 
 def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> None:
     """ATTITUDE: rotation."""
-    _clock(memory, message.time_boot_ms, now)
+    if heard_clock(memory.boot, message.time_boot_ms, now.mono):
+        rebooted(memory, memory.boot, now)
     seen = memory.observation
     seen.attitude = heard(message, now.mono, seen.attitude)
-    boat = memory.vehicle_type == SURFACE_BOAT  # they always roll
-    memory.turning = fastest((message.yawspeed,) if boat else message[4:])
+    if memory.vehicle_type == SURFACE_BOAT:  # they always roll
+        memory.turning = fastest(message.yawspeed)
+    else:
+        memory.turning = fastest(message.yawspeed, message.rollspeed, message.pitchspeed)
 
 
 def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
     """SYSTEM_TIME: the autopilot's clock."""
-    _clock(memory, message.time_boot_ms, now)
-
-
-def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> None:
-    """The boot as this clock tells it; the memory is begun anew if the clock shows a reboot."""
-    if heard_clock(memory.boot, time_boot_ms, now.mono):
+    if heard_clock(memory.boot, message.time_boot_ms, now.mono):
         rebooted(memory, memory.boot, now)
 
 
@@ -101,14 +100,14 @@ def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, no
     if not math.isfinite(sum(velocity)):
         return None
     status = memory.observation.sys_status
-    if memory.stack is Stack.ARDUPILOT:
+    if memory.stack is ARDUPILOT:
         if still and (nowhere or status is None or not sensors.estimate_is_healthy(status.message)):
             return None
         if not memory.pulse.armed and status is not None and sensors.estimate_is_faulty(status.message):
             return None
-    elif memory.stack is Stack.INAV and still and not _has_gps(status):
+    elif memory.stack is INAV and still and not _has_gps(status):
         return None
-    return math.hypot(*velocity[:2]) if memory.family is Family.ROVER else math.hypot(*velocity)
+    return math.hypot(*velocity[:2]) if memory.family is ROVER else math.hypot(*velocity)
 
 
 def _has_gps(status: Heard | None) -> bool:
@@ -117,11 +116,15 @@ def _has_gps(status: Heard | None) -> bool:
     )
 
 
-def fastest(rates: tuple[float, ...]) -> float:
+def fastest(*rates: float) -> float:
     """The greatest of some rates, whatever their signs; those that are no numbers do not count."""
-    if not math.isfinite(sum(rates)):
-        rates = tuple(rate for rate in rates if math.isfinite(rate))
-    return max(map(abs, rates), default=0.0)
+    found = 0.0
+    for rate in rates:
+        if found < rate < math.inf:
+            found = rate
+        elif found < -rate < math.inf:
+            found = -rate
+    return found
 
 
 def _moved(
@@ -143,21 +146,21 @@ def driving_speed(memory: Memory) -> float:
     hud = memory.observation.vfr_hud
     if hud is None:
         return 0.0
-    speed: float = hud.message.groundspeed if memory.family is Family.ROVER else hud.message.climb
+    speed: float = hud.message.groundspeed if memory.family is ROVER else hud.message.climb
     return speed if math.isfinite(speed) else 0.0
 
 
 def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, options: HardwareOptions) -> None:
     """SERVO_OUTPUT_RAW: the output watch of ArduPilot."""
-    if memory.stack is not Stack.ARDUPILOT or not options.watch_outputs or message.port != 0:
+    if memory.stack is not ARDUPILOT or not options.watch_outputs or message.port != 0:
         return
+    values = message[1:9] + message[10:18]
     hud = memory.observation.vfr_hud
     throttle = hud.message.throttle if hud is not None and is_fresh(hud, now.mono, motion.FRESH) else None
-    values = (*message[1:9], *message[10:18])
     outputs.heard_outputs(
         memory.watch, values, memory.vehicle_type, memory.pulse, throttle, driving_speed(memory), now.mono
     )
-    if memory.watch.driven and memory.stop.said is TriState.TRUE:
+    if memory.watch.driven and memory.stop.said is motion.TRUE:
         memory.stop = estop.NOTHING  # a motor that is driven is not stopped, whatever was said before
 
 
@@ -168,7 +171,7 @@ def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: 
     if not (name.startswith(b"SERVO") and name.endswith(b"_FUNCTION") and number.isdigit() and math.isfinite(value)):
         return
     channel = int(number)
-    if not 1 <= channel <= 32 or memory.stack is not Stack.ARDUPILOT:
+    if not 1 <= channel <= 32 or memory.stack is not ARDUPILOT:
         return
     memory.watch.name({**memory.watch.functions, channel: int(value)})
 

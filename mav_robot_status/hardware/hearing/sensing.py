@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...mavlink.definitions import SysStatus
 from .. import causes, estop, sensors
-from ..identity import Stack
+from ..identity import ARDUPILOT, PX4
 from ..observation import heard
 
 if TYPE_CHECKING:
@@ -19,10 +19,10 @@ def sys_status(memory: Memory, message: SysStatus, now: Instant, options: Hardwa
     """A SYS_STATUS: faulty bits, readiness, internal errors, and whether this ArduPilot is INAV."""
     if sensors.is_empty(message):
         return
-    if memory.stack is Stack.ARDUPILOT and not message.onboard_control_sensors_present & sensors.MOTOR_OUTPUTS:
+    if memory.stack is ARDUPILOT and not message.onboard_control_sensors_present & sensors.MOTOR_OUTPUTS:
         memory.unmask()
     stack = memory.stack
-    if stack is Stack.PX4:
+    if stack is PX4:
         _watch_rc(memory, message, now)
     seen = memory.observation
     seen.sys_status = heard(message, now.mono, seen.sys_status)
@@ -30,12 +30,12 @@ def sys_status(memory: Memory, message: SysStatus, now: Instant, options: Hardwa
     memory.faults = sensors.heard_faults(memory.faults, sensors.faulty_mask(message, stack), now)
     if memory.not_ready is not None and sensors.tells_readiness(message, stack) and sensors.is_ready(message, stack):
         memory.not_ready = None
-    if stack is Stack.ARDUPILOT and (message.errors_count1 or message.errors_count2):
+    if stack is ARDUPILOT and (message.errors_count1 or message.errors_count2):
         memory.internal_errors_since = memory.internal_errors_since or now
     elif memory.internal_errors_since is not None:
         memory.internal_errors_since = None
         memory.latches = causes.clear(memory.latches, (5001,))
-    fence = memory.latches.get(2009)
+    fence = memory.latches.get(2009) if memory.latches else None
     if fence is not None and now.mono - fence.last >= 1.0 and _fence_is_kept(message):
         memory.latches = causes.clear(memory.latches, (2009,))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from ...mavlink.definitions import Event, Statustext
 from .. import causes, estop, statustext
-from ..identity import Stack
+from ..identity import PX4, Stack
 from ..memory import Said
 from ..pulse import CRITICAL, TERMINATED
 from ..texts import UNCLASSIFIED, Effect, TextRule, When, classify
@@ -96,5 +96,5 @@ def event(memory: Memory, message: Event, now: Instant, options: HardwareOptions
         return
     memory.event = message.sequence
     external, internal = message.log_levels & 0x0F, message.log_levels >> 4
-    if memory.stack is Stack.PX4 and memory.pulse.armed and external <= UNCLASSIFIED and internal <= 5:
+    if memory.stack is PX4 and memory.pulse.armed and external <= UNCLASSIFIED and internal <= 5:
         memory.latches = causes.announce(memory.latches, 7000 + external, None, now, "EVENT")

@@ -16,7 +16,6 @@ from .boot import Boot
 from .commands import Asked
 from .flight_mode import AvailableMode
 from .identity import Family, Stack, family_of, stack_of
-from .motion import UNKNOWN as STILL_UNKNOWN
 from .motion import Motion
 from .observation import Observation, heard
 from .pulse import Pulse, first_beat
@@ -47,8 +46,8 @@ class Memory:
     faults: sensors.Faults = field(default_factory=dict)
     latches: causes.Latches = field(default_factory=dict)
     stop: estop.Stop = estop.NOTHING
-    motion: Motion = STILL_UNKNOWN
-    gps_motion: Motion = STILL_UNKNOWN
+    motion: Motion = field(default_factory=Motion)
+    gps_motion: Motion = field(default_factory=Motion)
     """What the receiver's own ground speed says; only used while the autopilot has no estimate."""
     turning: float = 0.0
     """The rotation that the latest ATTITUDE tells, rad/s."""

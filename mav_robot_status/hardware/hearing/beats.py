@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Final
 from ...interface.status import TriState
 from ...mavlink.definitions import Heartbeat
 from .. import boot as boot_rules
-from .. import causes, estop, motion, outputs, sensors
+from .. import causes, estop, outputs, sensors
 from ..flight_mode import is_initialising
 from ..identity import PX4
 from ..memory import Memory, begin
+from ..motion import Motion
 from ..observation import Observation, heard
 from ..pulse import armed_before, next_beat
 from .words import pass_time
@@ -47,7 +48,7 @@ def heartbeat(memory: Memory, message: Heartbeat, now: Instant, options: Hardwar
         memory.latches, memory.stop = causes.NO_LATCHES, estop.NOTHING
         memory.not_ready = memory.failsafe = None
     if not connected:
-        memory.motion = memory.gps_motion = motion.UNKNOWN
+        memory.motion, memory.gps_motion = Motion(), Motion()
     if not connected or (before.armed and not pulse.armed):
         memory.stop = memory.stop._replace(ready=0)
         memory.assumed_free = False

@@ -31,54 +31,59 @@ def extended_sys_state(memory: Memory, message: Any, now: Instant, options: Hard
 
 def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions) -> None:
     """GLOBAL_POSITION_INT: the first choice for speed."""
-    if heard_clock(memory.boot, message.time_boot_ms, now.mono):
+    at = now.mono
+    if heard_clock(memory.boot, message.time_boot_ms, at):
         rebooted(memory, memory.boot, now)
     seen = memory.observation
-    seen.global_position = heard(message, now.mono, seen.global_position)
+    seen.global_position = heard(message, at, seen.global_position)
     velocity = message.vx / 100, message.vy / 100, message.vz / 100
     speed = _speed(memory, velocity, not any(velocity), message.lat == 0 and message.lon == 0)
-    memory.motion = _moved(memory, memory.motion, speed, now, options)
+    _moved(memory, memory.motion, speed, at, options)
 
 
 def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> None:
     """LOCAL_POSITION_NED: the speed while no global position is fresh."""
-    if heard_clock(memory.boot, message.time_boot_ms, now.mono):
+    at = now.mono
+    if heard_clock(memory.boot, message.time_boot_ms, at):
         rebooted(memory, memory.boot, now)
     seen = memory.observation
-    seen.local_position = heard(message, now.mono, seen.local_position)
-    if not is_fresh(seen.global_position, now.mono, motion.FRESH):
+    seen.local_position = heard(message, at, seen.local_position)
+    if not is_fresh(seen.global_position, at, motion.FRESH):
         velocity = message.vx, message.vy, message.vz
         speed = _speed(memory, velocity, not any(velocity))
-        memory.motion = _moved(memory, memory.motion, speed, now, options)
+        _moved(memory, memory.motion, speed, at, options)
 
 
 def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> None:
     """VFR_HUD: the last choice for speed; the throttle for the output watch."""
+    at = now.mono
     seen = memory.observation
-    seen.vfr_hud = heard(message, now.mono, seen.vfr_hud)
-    if is_fresh(seen.global_position, now.mono, motion.FRESH) or is_fresh(seen.local_position, now.mono, motion.FRESH):
+    seen.vfr_hud = heard(message, at, seen.vfr_hud)
+    if is_fresh(seen.global_position, at, motion.FRESH) or is_fresh(seen.local_position, at, motion.FRESH):
         return
     still = message.groundspeed == 0  # whatever the climb, which comes from the barometer
     speed = _speed(memory, (message.groundspeed, 0.0, message.climb), still)
-    memory.motion = _moved(memory, memory.motion, speed, now, options)
+    _moved(memory, memory.motion, speed, at, options)
 
 
 def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> None:
     """GPS_RAW_INT: whether the receiver itself stands still."""
     if message.fix_type < FIX_3D or message.vel == NO_SPEED:
-        memory.gps_motion = motion.UNKNOWN
+        memory.gps_motion = motion.Motion()
         return
+    at = now.mono
     seen = memory.observation
-    seen.gps = heard(message, now.mono, seen.gps)
-    memory.gps_motion = _moved(memory, memory.gps_motion, message.vel / 100, now, options)
+    seen.gps = heard(message, at, seen.gps)
+    _moved(memory, memory.gps_motion, message.vel / 100, at, options)
 
 
 def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> None:
     """ATTITUDE: rotation."""
-    if heard_clock(memory.boot, message.time_boot_ms, now.mono):
+    at = now.mono
+    if heard_clock(memory.boot, message.time_boot_ms, at):
         rebooted(memory, memory.boot, now)
     seen = memory.observation
-    seen.attitude = heard(message, now.mono, seen.attitude)
+    seen.attitude = heard(message, at, seen.attitude)
     if memory.vehicle_type == SURFACE_BOAT:  # they always roll
         memory.turning = fastest(message.yawspeed)
     else:
@@ -127,12 +132,10 @@ def fastest(*rates: float) -> float:
     return found
 
 
-def _moved(
-    memory: Memory, before: motion.Motion, speed: float | None, now: Instant, options: HardwareOptions
-) -> motion.Motion:
-    """A motion after one more sample of speed."""
-    rotation = memory.turning if is_fresh(memory.observation.attitude, now.mono, motion.FRESH) else 0.0
-    return motion.moved(before, speed, rotation, memory.pulse.armed, options, now.mono)
+def _moved(memory: Memory, moving: motion.Motion, speed: float | None, now: float, options: HardwareOptions) -> None:
+    """One more sample of speed."""
+    rotation = memory.turning if is_fresh(memory.observation.attitude, now, motion.FRESH) else 0.0
+    motion.moved(moving, speed, rotation, memory.pulse.armed, options, now)
 
 
 def speed_over_ground(memory: Memory) -> float:

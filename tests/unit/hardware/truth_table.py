@@ -48,10 +48,8 @@ def memory_of(inputs: dict[str, Any]) -> tuple[Memory, Instant]:
         hear(memory, mav.LocalPositionNed(UPTIME_MS, 0, 0, 0, *inputs["vel"]), before, OPTIONS)
         sustained = NOW.mono - motion.SUSTAIN_OFF
         measured = memory.motion
-        memory.motion = measured._replace(
-            fast_since=None if measured.fast_since is None else sustained,
-            slow_since=None if measured.slow_since is None else sustained,
-        )
+        measured.fast_since = None if measured.fast_since is None else sustained
+        measured.slow_since = None if measured.slow_since is None else sustained
     if "std" in inputs:
         hear(memory, mav.CurrentMode(custom_mode, custom_mode, inputs["std"]), before, OPTIONS)
     for code in inputs.get("texts", ()):

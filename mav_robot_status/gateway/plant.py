@@ -10,6 +10,7 @@ import math
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
+from ..clock import Instant
 from ..config import ControllerConfig, PublisherConfig
 from ..errors import ConfigError, MavRobotStatusError
 from ..hardware.robot_hw import MavlinkRobotHW, Slot
@@ -20,12 +21,13 @@ from .guard import Guard, GuardedPublisher
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from ..clock import Instant
     from ..config import Config
     from ..hardware.robot_hw import Tracked
     from ..interface import MavlinkPort, Publisher
     from ..mavlink.framing import Frame
 
+NEVER: Final = Instant(0.0, 0)
+"""The time of a plant that has not lived yet."""
 DEFAULT_PUBLISHERS: Final = (PublisherConfig("json"), PublisherConfig("mavlink"))
 DEFAULT_CONTROLLER: Final = ControllerConfig(
     "robot_status_controller", "mav_robot_status/IndustrialRobotStatusController", {}, "default"
@@ -89,7 +91,8 @@ class Plant:
         """Handles that publish from the start, before their vehicle is heard."""
         self._seen: set[str] = set()
         self._service_due = math.inf
-        self._last: float | None = None
+        self.now = NEVER
+        """Up to when it has lived."""
         check(config)
         with ExitStack() as undo:
             undo.callback(self._close_publishers)
@@ -106,8 +109,8 @@ class Plant:
         """Read the hardware, update the controllers, let the publishers do what waits."""
         self.hw.read(now)
         self._attend()
-        period = 0.0 if self._last is None else now.mono - self._last
-        self._last = now.mono
+        period = 0.0 if self.now is NEVER else now.mono - self.now.mono
+        self.now = now
         for post in self._posts:
             if not post.running and self._may_start(post):
                 post.guard.call(None, post.controller.starting, now)

@@ -152,8 +152,9 @@ def matters(memory: Memory, options: HardwareOptions) -> Matters:
 def may_matter(memory: Memory, message: object, before: Matters, options: HardwareOptions) -> bool:
     """Whether `message`, just heard, changed something that matters since `before`."""
     kind = type(message)
-    part = PARTS.get(kind)
-    return part(memory, options) != before[kind] if part is not None else matters(memory, options) != before
+    if kind in PARTS:
+        return PARTS[kind](memory, options) != before[kind]
+    return matters(memory, options) != before
 
 
 def settles_at(memory: Memory, message: object) -> float:

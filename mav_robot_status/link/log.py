@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from struct import Struct
 from typing import Any, NamedTuple, TypeVar
 
 from mav_robot_status.clock import Instant
@@ -24,6 +25,7 @@ BLOCK = 1 << 16
 """Bytes handed on at once."""
 STAMP_SIZE = 8
 """Bytes of time stamp before each frame."""
+STAMP = Struct(">Q").unpack
 
 T = TypeVar("T")
 
@@ -101,7 +103,10 @@ def _is_outlier(latest: int, stamp: int, following: int) -> bool:
 
 def stamp_of(raw: bytes, otherwise: int) -> int:
     """The stamp in front of a frame, whatever it says; `otherwise` if the log begins in the middle of it."""
-    return int.from_bytes(raw, "big") if len(raw) == STAMP_SIZE else otherwise
+    if len(raw) != STAMP_SIZE:
+        return otherwise
+    (stamp,) = STAMP(raw)
+    return stamp  # type: ignore[no-any-return]
 
 
 class LogReader:

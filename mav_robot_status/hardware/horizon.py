@@ -108,6 +108,21 @@ def _of_sys_status(memory: Memory, options: HardwareOptions) -> tuple[object, ..
     )
 
 
+def _of_landed_state(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.extended_sys_state
+    return seen and seen.since, seen and seen.message
+
+
+def _of_current_mode(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.current_mode
+    return seen and seen.since, seen and seen.message
+
+
+def _of_esc(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.esc
+    return seen and seen.since, seen and outputs.is_at_stop(memory.watch, memory.vehicle_type)
+
+
 def _of_the_rest(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     """What the vehicle says of itself, and the streams of which a message in PARTS is none."""
     seen = memory.observation
@@ -125,6 +140,12 @@ def _of_the_rest(memory: Memory, options: HardwareOptions) -> tuple[object, ...]
 
 PARTS: Final[Mapping[type, Part]] = {
     mav.Attitude: _of_attitude,
+    mav.CurrentMode: _of_current_mode,
+    mav.EscStatus: _of_esc,
+    mav.EscTelemetry1To4: _of_esc,
+    mav.EscTelemetry5To8: _of_esc,
+    mav.EscTelemetry9To12: _of_esc,
+    mav.ExtendedSysState: _of_landed_state,
     mav.GlobalPositionInt: _of_global_position,
     mav.GpsRawInt: _of_gps,
     mav.Heartbeat: _of_heartbeat,

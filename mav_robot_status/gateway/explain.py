@@ -17,7 +17,7 @@ from ..link.log import Stamped
 from .live import Live
 from .plant import DEFAULT_CONTROLLER, Plant
 from .recorded import Recording
-from .replay import NEVER, Nobody, run_through
+from .replay import Nobody, run_through
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -40,9 +40,7 @@ def explain_log(config: Config, path: str, at: str | None) -> list[dict[str, Any
     `at` is an RFC 3339 time, or `+44` for seconds after the first record. Raises UsageError if the log lacks it.
     """
     plant = Plant(silent(config), Nobody(), NO_OUTPUT, patient=True)
-    end = NEVER
-    for now, _ in run_through(plant, _up_to(Recording(path), at)):
-        end = now
+    end = run_through(plant, _up_to(Recording(path), at))
     return explanations(plant.hw, end)
 
 

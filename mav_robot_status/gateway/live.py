@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config
-    from .station import Channel, Station
+    from .station import Station
 
 log = logging.getLogger(__name__)
 
@@ -136,17 +136,13 @@ class Live:
             self.switchboard.conflicts.clear()
 
     def _ask(self, now: Instant) -> None:
-        ways: dict[tuple[int, int], Channel] = {
-            tracked.ids: way
-            for tracked in self.plant.hw.vehicles
-            if tracked.ids is not None and (way := self.switchboard.paths.way(tracked.ids)) is not None
-        }
-        passive = {ids for ids, way in ways.items() if way.station.passive}
-        for ask in self.plant.hw.write(now, passive):
-            self.switchboard.tell(ways[ask.system, ask.component], ask.message, ask.system)
+        for ask in self.plant.hw.write(now, self.switchboard.passive_vehicles()):
+            way = self.switchboard.paths.way((ask.system, ask.component))
+            if way is not None:
+                self.switchboard.tell(way, ask.message, ask.system)
 
     def _next_due(self, now: float) -> float:
-        due = min(self.plant.next_due(now), self._told_at, self.switchboard.next_due())
+        due = min(self.plant.next_due(now, now + LONGEST_WAIT), self._told_at, self.switchboard.next_due())
         return min(due, self._beat_at + HEARTBEAT_PERIOD) if self._config.identity.heartbeat else due
 
     def _tell_silence(self, now: Instant) -> None:

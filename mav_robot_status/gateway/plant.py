@@ -10,6 +10,7 @@ import math
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
+from ..clock import Instant
 from ..config import ControllerConfig, PublisherConfig
 from ..errors import ConfigError, MavRobotStatusError
 from ..hardware.robot_hw import MavlinkRobotHW, Slot
@@ -20,12 +21,13 @@ from .guard import Guard, GuardedPublisher
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from ..clock import Instant
     from ..config import Config
     from ..hardware.robot_hw import Tracked
     from ..interface import MavlinkPort, Publisher
     from ..mavlink.framing import Frame
 
+NEVER: Final = Instant(0.0, 0)
+"""The time of a plant that has not lived yet."""
 DEFAULT_PUBLISHERS: Final = (PublisherConfig("json"), PublisherConfig("mavlink"), PublisherConfig("mirror"))
 LIVE_PUBLISHERS: Final = frozenset({"mavlink", "mirror", "http"})
 """Those that a replay does without: there is nobody to hear MAVLink, and a page would show the end of the log."""
@@ -91,7 +93,8 @@ class Plant:
         """Handles that publish from the start, before their vehicle is heard."""
         self._seen: set[str] = set()
         self._service_due = math.inf
-        self._last: float | None = None
+        self.now = NEVER
+        """Up to when it has lived."""
         check(config)
         with ExitStack() as undo:
             undo.callback(self._close_publishers)
@@ -119,8 +122,8 @@ class Plant:
         """Read the hardware, update the controllers, let the publishers do what waits."""
         self.hw.read(now)
         self._attend()
-        period = 0.0 if self._last is None else now.mono - self._last
-        self._last = now.mono
+        period = 0.0 if self.now is NEVER else now.mono - self.now.mono
+        self.now = now
         for post in self._posts:
             if not post.running and self._may_start(post):
                 post.guard.call(None, post.controller.starting, now)
@@ -133,9 +136,12 @@ class Plant:
             if again is not None:
                 self._service_due = min(self._service_due, again)
 
-    def next_due(self, now: float) -> float:
-        """When (monotonic seconds) `tick` has something to do, if no frame arrives before."""
-        due = min(self.hw.next_due(), self._service_due)
+    def next_due(self, now: float, until: float = -math.inf) -> float:
+        """When (monotonic seconds) `tick` has something to do, if no frame arrives before.
+
+        `until` is handed to the hardware, see there.
+        """
+        due = min(self.hw.next_due(until), self._service_due)
         for post in self._posts:
             if post.running:
                 due = min(due, post.guard.call(math.inf, post.controller.next_due, now))
@@ -171,10 +177,9 @@ class Plant:
 
     def _attend(self) -> None:
         """Make the controllers of handles that have become known."""
-        names = self.hw.handles.get_names()
-        if len(names) == len(self._seen):
+        if len(self.hw.handles) == len(self._seen):
             return
-        for name in names:
+        for name in self.hw.handles.get_names():
             if name in self._seen:
                 continue
             self._seen.add(name)

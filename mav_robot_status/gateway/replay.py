@@ -6,25 +6,23 @@ import logging
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from ..clock import Instant, later
-from .plant import Plant
+from ..clock import later
+from .plant import NEVER, Plant
 from .recorded import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Hashable, Iterable, Iterator, Sequence
+    from collections.abc import Collection, Hashable, Iterable, Sequence
     from typing import TextIO
 
+    from ..clock import Instant
     from ..config import Config
     from ..interface import Audience
     from ..link.log import Stamped
-    from ..mavlink.framing import Frame
 
 log = logging.getLogger(__name__)
 
 MOST_OVERDUE: Final = 3
 """Rounds without progress in which a part of a third party may ask to be called again at once."""
-NEVER: Final = Instant(0.0, 0)
-"""When a log ends in which nothing was read."""
 
 
 class Nobody:
@@ -47,32 +45,33 @@ def replay(config: Config, path: str, stdout: TextIO) -> None:
     recording = Recording(path)
     log.info("replaying %s", path)
     plant = Plant(config, Nobody(), stdout, patient=True)
-    last = NEVER
     try:
-        for now, _ in run_through(plant, recording):
-            last = now
+        plant.now = run_through(plant, recording)
     finally:
-        plant.close(last)
+        plant.close(plant.now)
     log.info("%s", recording.summary())
 
 
-def run_through(plant: Plant, recording: Iterable[Stamped]) -> Iterator[tuple[Instant, Frame | None]]:
-    """Feed a recording to the plant; gives each instant after the plant has lived it."""
+def run_through(plant: Plant, recording: Iterable[Stamped]) -> Instant:
+    """Feed a recording to the plant; gives the last instant of it. The plant has lived what came before the next."""
+    hw = plant.hw
     last: Instant | None = None
     due = math.inf
     for now, frame, new_segment in recording:
+        mono = now.mono
         if last is not None and new_segment:
             plant.forget(last)
-        elif last is not None and due < now.mono:
-            live_through(plant, last, now)
-            due = plant.next_due(now.mono)
+        elif last is not None and (due < mono or hw.deadline < mono):
+            if plant.next_due(last.mono, mono) < mono:
+                live_through(plant, last, now)
+            due = plant.next_due(mono)
         if frame is not None:
-            plant.take(frame, now)
-            if plant.hw.stirred:
+            hw.take(frame, now)
+            if hw.stirred:
                 plant.tick(now)
-                due = plant.next_due(now.mono)
+                due = plant.next_due(mono)
         last = now
-        yield now, frame
+    return NEVER if last is None else last
 
 
 def live_through(plant: Plant, last: Instant, until: Instant) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 from .explain import NO_OUTPUT, silent
 from .plant import Plant
 from .recorded import Recording
-from .replay import NEVER, Nobody, run_through
+from .replay import Nobody, run_through
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -38,15 +38,11 @@ def watch(config: Config, path: str, observer: Observer, progress: Callable[[flo
     """
     recording = Recording(path)
     plant = _WatchedPlant(config, observer)
-    last = NEVER
-    for now, _ in run_through(plant, _segments(recording, observer)):
-        last = now
-        progress(recording.share)
-    observer.end(last)
+    observer.end(run_through(plant, _segments(recording, observer, progress)))
     return recording.summary()
 
 
-def _segments(recording: Iterable[Stamped], observer: Observer) -> Iterator[Stamped]:
+def _segments(recording: Recording, observer: Observer, progress: Callable[[float], None]) -> Iterator[Stamped]:
     """The recording; the observer is told where a segment begins."""
     first = True
     for stamped in recording:
@@ -54,6 +50,7 @@ def _segments(recording: Iterable[Stamped], observer: Observer) -> Iterator[Stam
             observer.begin(stamped.now)
             first = False
         yield stamped
+        progress(recording.share)
 
 
 class _WatchedPlant(Plant):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+NONE: Final[frozenset[tuple[int, int]]] = frozenset()
 SETUP_SIGNING: Final = 256
 """Carries a key: passed on to nobody."""
 
@@ -179,6 +180,13 @@ class Switchboard:
                 end.send(part)
 
     # what goes out
+
+    def passive_vehicles(self) -> frozenset[tuple[int, int]]:
+        """The vehicles to which nothing may be sent."""
+        if not any(station.passive for station in self.stations):
+            return NONE
+        ways = ((ids, self.paths.way(ids)) for ids in self.paths.vehicles())
+        return frozenset(ids for ids, way in ways if way is None or way.passive)
 
     def audiences(self) -> list[Audience]:
         """Everyone who hears statuses: peers and outs; of serial devices only outs, autopilots drop unknown ids."""

@@ -6,7 +6,8 @@ carries time_boot_ms serves. A step back counts when the next sample confirms it
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from dataclasses import dataclass
+from typing import Final
 
 STEP_BACK_MS: Final = 2000
 WRAP: Final = 1 << 32
@@ -14,8 +15,9 @@ GRACE: Final = 10.0
 """Seconds after boot during which sensor bits raise no error."""
 
 
-class Boot(NamedTuple):
-    """The autopilot's clock as last heard."""
+@dataclass(slots=True)
+class Boot:
+    """The autopilot's clock as last heard: a record that each sample changes in place."""
 
     at: float
     """Monotonic seconds of the boot; of the first heartbeat while no clock was heard."""
@@ -24,21 +26,24 @@ class Boot(NamedTuple):
     """A sample that lies back and waits to be confirmed."""
 
 
-def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> tuple[Boot, bool]:
-    """The clock after one more sample, and whether it shows a reboot."""
+def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> bool:
+    """One more sample; whether it shows a reboot."""
     booted = now - time_boot_ms / 1000
-    if boot.clock_ms is None:
-        return Boot(booted, time_boot_ms), False
-    step = _difference(time_boot_ms, boot.clock_ms)
-    if -STEP_BACK_MS <= step <= 0:
-        return boot._replace(doubt_ms=None), False
+    step = 1 if boot.clock_ms is None else _difference(time_boot_ms, boot.clock_ms)
     if step > 0:
         # on its way a sample is only ever held up, so the earliest boot is the truest; after 49 days the clock wraps
-        at = min(boot.at, booted) if booted - boot.at < STEP_BACK_MS / 1000 else booted
-        return Boot(at, time_boot_ms), False
+        if boot.clock_ms is None or not 0 <= booted - boot.at < STEP_BACK_MS / 1000:
+            boot.at = booted
+        boot.clock_ms, boot.doubt_ms = time_boot_ms, None
+        return False
+    if step >= -STEP_BACK_MS:
+        boot.doubt_ms = None
+        return False
     if boot.doubt_ms is None or _difference(time_boot_ms, boot.doubt_ms) < 0:
-        return boot._replace(doubt_ms=time_boot_ms), False
-    return Boot(booted, time_boot_ms), True
+        boot.doubt_ms = time_boot_ms
+        return False
+    boot.at, boot.clock_ms, boot.doubt_ms = booted, time_boot_ms, None
+    return True
 
 
 def _difference(a: int, b: int) -> int:

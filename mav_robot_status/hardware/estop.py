@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..interface.status import TriState
-from .identity import Family, Stack
+from .identity import ARDUPILOT, Family, Stack
 from .sensors import is_ready, safety_switch_on
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def said(stop: Stop, engaged: bool, text: str | None, now: Instant, source: str 
 def heard_sys_status(stop: Stop, status: SysStatus, pulse: Pulse, stack: Stack, now: float) -> Stop:
     """`stop` after one more SYS_STATUS: two in a row that are ready, well after the disarm, end what texts said."""
     if (
-        stack is not Stack.ARDUPILOT
+        stack is not ARDUPILOT
         or pulse.armed
         or safety_switch_on(status)
         or not is_ready(status, stack)

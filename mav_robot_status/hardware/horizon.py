@@ -15,115 +15,200 @@ from .hearing.movement import driving_speed, speed_over_ground
 from .observation import slowly_fresh_until
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from .memory import Memory
     from .options import HardwareOptions
 
-MOVEMENT: Final = frozenset(
-    {
-        mav.Attitude,
-        mav.GlobalPositionInt,
-        mav.GpsRawInt,
-        mav.LocalPositionNed,
-        mav.ServoOutputRaw,
-        mav.SystemTime,
-        mav.VfrHud,
-    }
-)
-"""The messages that come several times a second."""
+    Part = Callable[[Memory, HardwareOptions], tuple[object, ...]]
+    Matters = Mapping[type | None, tuple[object, ...]]
 
 
-def matters(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
-    """All that a status depends on but times of arrival: if equal before and after a message, it changed nothing."""
-    return of_movement(memory, options), of_the_rest(memory)
+def _of_clock(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    """Every clock dates the boot a little better; only faults wait for that."""
+    return memory.boots, memory.faults and memory.boot.at
 
 
-def of_movement(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
-    """The part of `matters` that a message in MOVEMENT can change, unless it shows a reboot."""
-    seen, watch = memory.observation, memory.watch
-    moving, gps = memory.motion, memory.gps_motion
-    held = watch.held_since is not None
+def _of_attitude(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.attitude
+    return seen and seen.since, memory.faults and memory.boot.at
+
+
+def _of_global_position(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    moving, seen = memory.motion, memory.observation.global_position
     return (
+        seen and seen.since,
+        memory.faults and memory.boot.at,
         moving.value,
-        moving.fast_since,
-        moving.slow_since,
+        moving.slow_since is None,
         moving.speed is None,
-        gps.value,
-        gps.fast_since,
-        gps.slow_since,
-        gps.speed is None,
         not memory.pulse.armed and speed_over_ground(memory) > options.v_on_disarmed,
-        watch.driven,
-        seen.esc is not None and outputs.is_at_stop(watch, memory.vehicle_type),
-        watch.held_since,
-        held and outputs.is_vetoed(watch, memory.family, driving_speed(memory)),
-        seen.vfr_hud if held else None,  # a speed that grows vetoes
-        memory.stop.said,  # ended by a motor that is driven
-        memory.boots,
-        memory.boot.at if memory.faults else None,  # dated a little better by each clock, while faults wait for it
-        *[heard.since for heard in seen if heard is not None],
     )
 
 
-def of_the_rest(memory: Memory) -> tuple[object, ...]:
-    """The other part: what the vehicle says of itself."""
-    seen = memory.observation
+def _of_local_position(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    moving, seen = memory.motion, memory.observation.local_position
     return (
-        seen.heartbeat.message if seen.heartbeat is not None else None,
-        seen.sys_status.message[:3] if seen.sys_status is not None else None,
-        [bit for bit, fault in memory.faults.items() if fault.messages >= sensors.DEBOUNCE_MESSAGES],
-        memory.faults.keys(),
+        seen and seen.since,
+        memory.faults and memory.boot.at,
+        moving.value,
+        moving.slow_since is None,
+        moving.speed is None,
+    )
+
+
+def _of_vfr_hud(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    moving, seen, watch = memory.motion, memory.observation.vfr_hud, memory.watch
+    return (
+        seen and seen.since,
+        moving.value,
+        moving.slow_since is None,
+        moving.speed is None,
+        watch.held_since is not None and outputs.is_vetoed(watch, memory.family, driving_speed(memory)),
+    )
+
+
+def _of_gps(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.gps
+    return seen and seen.since, memory.gps_motion.value
+
+
+def _of_outputs(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    watch = memory.watch
+    return (
+        watch.driven,
+        watch.held_since,
+        memory.observation.esc and outputs.is_at_stop(watch, memory.vehicle_type),
+        memory.stop.said,  # ended by a motor that is driven
+    )
+
+
+def _of_heartbeat(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    """A heartbeat like the last one, in time, only lets time pass, and confirms the outputs at rest."""
+    seen = memory.observation.heartbeat
+    return (
+        seen and (seen.since, seen.message),
+        memory.latches.keys(),
+        memory.observation.esc and outputs.is_at_stop(memory.watch, memory.vehicle_type),
+    )
+
+
+def _of_sys_status(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.sys_status
+    return (
+        seen and (seen.since, seen.message[:3]),
+        memory.faults and [(bit, fault.messages >= sensors.DEBOUNCE_MESSAGES) for bit, fault in memory.faults.items()],
         memory.stop.said,
-        memory.stop.text,
         memory.stop.ready >= estop.READY_MESSAGES,
-        [(code, latch.text) for code, latch in memory.latches.items()],
+        len(memory.latches),
         memory.not_ready,
-        memory.failsafe,
         memory.internal_errors_since,
         memory.rc_lost_since,
-        seen.extended_sys_state.message if seen.extended_sys_state is not None else None,
-        seen.current_mode.message if seen.current_mode is not None else None,
-        memory.modes,
         memory.impostor,
+    )
+
+
+def _of_landed_state(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.extended_sys_state
+    return seen and seen.since, seen and seen.message
+
+
+def _of_current_mode(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.current_mode
+    return seen and seen.since, seen and seen.message
+
+
+def _of_esc(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    seen = memory.observation.esc
+    return seen and seen.since, seen and outputs.is_at_stop(memory.watch, memory.vehicle_type)
+
+
+def _of_the_rest(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    """What the vehicle says of itself, and the streams of which a message in PARTS is none."""
+    seen = memory.observation
+    return (
+        seen.extended_sys_state and seen.extended_sys_state.message,
+        seen.current_mode and seen.current_mode.message,
+        [heard.since for heard in seen if heard is not None],
+        memory.stop.text,
+        [(code, latch.text) for code, latch in memory.latches.items()],
+        memory.failsafe,
+        memory.modes,
         memory.assumed_free,
     )
 
 
-def may_matter(memory: Memory, message: object, before: tuple[object, ...], options: HardwareOptions) -> bool:
+PARTS: Final[Mapping[type, Part]] = {
+    mav.Attitude: _of_attitude,
+    mav.CurrentMode: _of_current_mode,
+    mav.EscStatus: _of_esc,
+    mav.EscTelemetry1To4: _of_esc,
+    mav.EscTelemetry5To8: _of_esc,
+    mav.EscTelemetry9To12: _of_esc,
+    mav.ExtendedSysState: _of_landed_state,
+    mav.GlobalPositionInt: _of_global_position,
+    mav.GpsRawInt: _of_gps,
+    mav.Heartbeat: _of_heartbeat,
+    mav.LocalPositionNed: _of_local_position,
+    mav.ParamValue: _of_outputs,
+    mav.ServoOutputRaw: _of_outputs,
+    mav.SysStatus: _of_sys_status,
+    mav.SystemTime: _of_clock,
+    mav.VfrHud: _of_vfr_hud,
+}
+"""All that each of the messages that come several times a second can change, but for times of arrival."""
+
+
+SPEEDS: Final = frozenset({mav.GlobalPositionInt, mav.GpsRawInt, mav.LocalPositionNed, mav.VfrHud})
+"""The messages that may begin a motion, or end one, a while after they were heard."""
+
+
+def matters(memory: Memory, options: HardwareOptions) -> Matters:
+    """All that a status depends on but times of arrival: if equal before and after a message, it changed nothing."""
+    found: dict[type | None, tuple[object, ...]] = {kind: part(memory, options) for kind, part in PARTS.items()}
+    found[None] = _of_the_rest(memory, options)
+    return found
+
+
+def may_matter(memory: Memory, message: object, before: Matters, options: HardwareOptions) -> bool:
     """Whether `message`, just heard, changed something that matters since `before`."""
-    if type(message) in MOVEMENT:
-        return of_movement(memory, options) != before[0]
+    kind = type(message)
+    if kind in PARTS:
+        return PARTS[kind](memory, options) != before[kind]
     return matters(memory, options) != before
 
 
-def next_change(memory: Memory, now: float, options: HardwareOptions) -> float:
-    """The first time (monotonic seconds) after `now` at which the status may change though nothing is heard."""
-    return min((at for at in _ends(memory, options) if at > now), default=math.inf)
+def settles_at(memory: Memory, message: object) -> float:
+    """When (monotonic seconds) a motion begins or ends by a message of SPEEDS if no other comes; infinity: never."""
+    return motion.settles_at(memory.gps_motion if type(message) is mav.GpsRawInt else memory.motion)
 
 
-def _ends(memory: Memory, options: HardwareOptions) -> Iterator[float]:
+def next_change(memory: Memory, after: float, options: HardwareOptions) -> float:
+    """The first time (monotonic seconds) later than `after` at which the status may change though nothing is heard."""
+    return min((at for at in _ends(memory, after, options) if at > after), default=math.inf)
+
+
+def _ends(memory: Memory, after: float, options: HardwareOptions) -> Iterator[float]:
     """When what was heard becomes too old, latches end, doubts are settled."""
     seen = memory.observation
-    if seen.heartbeat is not None:
-        yield _after(seen.heartbeat.at + options.heartbeat_timeout)
-    for heard in seen[1:]:
-        if heard is not None:
-            least = motion.FRESH
-            if heard is seen.sys_status:
-                least = options.sys_status_timeout
-            elif heard is seen.current_mode:
-                least = CURRENT_MODE_FRESH
-            yield _after(max(heard.at + least, slowly_fresh_until(heard)))
+    for heard in seen:
+        if heard is None:
+            continue
+        least = motion.FRESH
+        if heard is seen.heartbeat:
+            least = options.heartbeat_timeout
+        elif heard is seen.sys_status:
+            least = options.sys_status_timeout
+        elif heard is seen.current_mode:
+            least = CURRENT_MODE_FRESH
+        soon = _after(heard.at + least)
+        yield soon if soon > after or heard is seen.heartbeat else _after(slowly_fresh_until(heard))
     if memory.watch.at is not None:
         yield _after(memory.watch.at + motion.FRESH)
     if memory.watch.held_since is not None:
         yield memory.watch.held_since + outputs.HOLD
-    for moving in (memory.motion, memory.gps_motion):
-        if moving.fast_since is not None:
-            yield moving.fast_since + motion.SUSTAIN_ON
-        if moving.slow_since is not None:
-            yield moving.slow_since + motion.SUSTAIN_OFF
+    yield motion.settles_at(memory.motion)
+    yield motion.settles_at(memory.gps_motion)
     for fault in memory.faults.values():
         yield fault.since.mono + sensors.DEBOUNCE_SECONDS
     for code, latch in memory.latches.items():

@@ -47,6 +47,10 @@ class Family(Enum):
     OTHER = "other"
 
 
+# Names of their own, for what runs many times a second: Python 3.11 takes long to find a member in its enumeration.
+ARDUPILOT, PX4, INAV = Stack.ARDUPILOT, Stack.PX4, Stack.INAV
+PLANE, ROVER = Family.PLANE, Family.ROVER
+
 FAMILIES: Final[dict[int, Family]] = {
     **dict.fromkeys((2, 3, 4, 13, 14, 15, 29, 35, 43), Family.COPTER),
     **dict.fromkeys((1, 16, *range(19, 26)), Family.PLANE),

@@ -1,12 +1,14 @@
-"""What is remembered of one vehicle: a value; each message gives the next one (`hearing`).
+"""What is remembered of one vehicle: each message changes it (`hearing`), time alone does not.
 
-It holds no clock and no socket, so a recording gives the same memory as the live link did.
+It holds no clock and no socket, so a recording gives the same memory as the live link did. Only the record itself
+changes; what it is made of, but for the observation, are values.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final, NamedTuple
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..clock import Instant
 from . import causes, estop, outputs, sensors, statustext
@@ -14,15 +16,12 @@ from .boot import Boot
 from .commands import Asked
 from .flight_mode import AvailableMode
 from .identity import Family, Stack, family_of, stack_of
-from .motion import UNKNOWN as STILL_UNKNOWN
 from .motion import Motion
-from .observation import Heard, Observation, heard
+from .observation import Observation, heard
 from .pulse import Pulse, first_beat
 
 if TYPE_CHECKING:
     from ..mavlink.definitions import Heartbeat
-
-NO_MODES: Final[Mapping[int, AvailableMode]] = {}
 
 
 class Said(NamedTuple):
@@ -33,7 +32,8 @@ class Said(NamedTuple):
     last: float
 
 
-class Memory(NamedTuple):
+@dataclass(slots=True)
+class Memory:
     """One vehicle."""
 
     observation: Observation
@@ -43,15 +43,17 @@ class Memory(NamedTuple):
     autopilot: int
     impostor: bool = False
     """Whether this ArduPilot has shown that it is INAV."""
-    faults: sensors.Faults = sensors.NO_FAULTS
-    latches: causes.Latches = causes.NO_LATCHES
+    faults: sensors.Faults = field(default_factory=dict)
+    latches: causes.Latches = field(default_factory=dict)
     stop: estop.Stop = estop.NOTHING
-    motion: Motion = STILL_UNKNOWN
-    gps_motion: Motion = STILL_UNKNOWN
+    motion: Motion = field(default_factory=Motion)
+    gps_motion: Motion = field(default_factory=Motion)
     """What the receiver's own ground speed says; only used while the autopilot has no estimate."""
-    watch: outputs.Watch = outputs.NOT_WATCHED
+    turning: float = 0.0
+    """The rotation that the latest ATTITUDE tells, rad/s."""
+    watch: outputs.Watch = field(default_factory=outputs.Watch)
     texts: statustext.Assembly = statustext.EMPTY
-    modes: Mapping[int, AvailableMode] = NO_MODES
+    modes: Mapping[int, AvailableMode] = field(default_factory=dict)
     not_ready: Said | None = None
     """Why it cannot be armed."""
     failsafe: Said | None = None
@@ -70,15 +72,24 @@ class Memory(NamedTuple):
     formerly: tuple[int, int] | None = None
     """The autopilot and vehicle type that spoke with these ids before."""
 
-    @property
-    def stack(self) -> Stack:
-        """The software on the autopilot."""
-        return stack_of(self.autopilot, self.impostor)
+    stack: Stack = field(init=False)
+    """The software on the autopilot."""
+    family: Family = field(init=False)
+    """The kind of vehicle."""
 
-    @property
-    def family(self) -> Family:
-        """The kind of vehicle."""
-        return family_of(self.vehicle_type)
+    def __post_init__(self) -> None:
+        self.stack = stack_of(self.autopilot, self.impostor)
+        self.family = family_of(self.vehicle_type)
+
+    def become(self, other: Memory) -> None:
+        """Forget everything for what `other` remembers."""
+        for name in self.__slots__:
+            setattr(self, name, getattr(other, name))
+
+    def unmask(self) -> None:
+        """This ArduPilot has shown that it is INAV."""
+        self.impostor = True
+        self.stack = stack_of(self.autopilot, self.impostor)
 
 
 def begin(heartbeat: Heartbeat, now: Instant) -> Memory:
@@ -90,8 +101,3 @@ def begin(heartbeat: Heartbeat, now: Instant) -> Memory:
         vehicle_type=heartbeat.type,
         autopilot=heartbeat.autopilot,
     )
-
-
-def observed(memory: Memory, **what: Heard) -> Memory:
-    """The memory with these fields of its observation replaced."""
-    return memory._replace(observation=memory.observation._replace(**what))

@@ -1,24 +1,28 @@
 """in_motion: airborne, or measured speed and rotation with hysteresis.
 
-The measured part is a value that each sample replaces; the last sample holds until the next.
+The last sample holds until the next.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
 from ..interface.status import TriState
 
 if TYPE_CHECKING:
     from .options import HardwareOptions
 
+TRUE, FALSE = TriState.TRUE, TriState.FALSE
 RATE_ON, RATE_OFF = 0.15, 0.08  # rad/s
 SUSTAIN_ON, SUSTAIN_OFF = 0.3, 1.0  # seconds
 FRESH: Final = 2.5  # seconds, or three measured intervals
 
 
-class Motion(NamedTuple):
-    """What speed and rotation have said so far."""
+@dataclass(slots=True)
+class Motion:
+    """What speed and rotation have said so far: a record that each sample changes in place."""
 
     value: TriState = TriState.UNKNOWN
     fast_since: float | None = None
@@ -29,32 +33,35 @@ class Motion(NamedTuple):
     """The latest sample, m/s; None while there is no estimate."""
 
 
-UNKNOWN: Final = Motion()
-
-
-def settle(motion: Motion, now: float) -> Motion:
-    """The motion at `now` if no sample came since."""
+def settled(motion: Motion, now: float) -> TriState:
+    """The value at `now` if no sample came since."""
     if motion.fast_since is not None and now >= motion.fast_since + SUSTAIN_ON:
-        return motion if motion.value is TriState.TRUE else motion._replace(value=TriState.TRUE)
+        return TRUE
     if motion.slow_since is not None and now >= motion.slow_since + SUSTAIN_OFF:
-        return motion if motion.value is TriState.FALSE else motion._replace(value=TriState.FALSE)
-    return motion
+        return FALSE
+    return motion.value
 
 
-def moved(
-    motion: Motion, speed: float | None, rate: float, armed: bool, options: HardwareOptions, now: float
-) -> Motion:
-    """The motion after a sample: `speed` in m/s (None: not measured), `rate` in rad/s."""
-    motion = settle(motion, now)
-    if speed is None:
-        return UNKNOWN
+def settles_at(motion: Motion) -> float:
+    """When (monotonic seconds) `settled` will find another value if no sample comes; infinity: never."""
+    if motion.fast_since is not None:
+        return math.inf if motion.value is TRUE else motion.fast_since + SUSTAIN_ON
+    if motion.slow_since is not None and motion.value is not FALSE:
+        return motion.slow_since + SUSTAIN_OFF
+    return math.inf
+
+
+def moved(motion: Motion, speed: float | None, rate: float, armed: bool, options: HardwareOptions, now: float) -> None:
+    """One more sample: `speed` in m/s (None: not measured, which ends all that was known), `rate` in rad/s."""
+    motion.value = settled(motion, now) if speed is not None else TriState.UNKNOWN
+    motion.speed = speed
     on = options.v_on if armed else options.v_on_disarmed
     off = options.v_off if armed else options.v_off_disarmed
-    fast = speed > on or rate > RATE_ON
-    slow = speed < off and rate < RATE_OFF
-    return Motion(
-        motion.value,
-        (motion.fast_since if motion.fast_since is not None else now) if fast else None,
-        (motion.slow_since if motion.slow_since is not None else now) if slow else None,
-        speed,
-    )
+    if speed is None or not (speed > on or rate > RATE_ON):
+        motion.fast_since = None
+    elif motion.fast_since is None:
+        motion.fast_since = now
+    if speed is None or not (speed < off and rate < RATE_OFF):
+        motion.slow_since = None
+    elif motion.slow_since is None:
+        motion.slow_since = now

@@ -1,12 +1,17 @@
-"""What was heard from one vehicle, and when: a value that each message replaces.
+"""What was heard from one vehicle, and when. Times are seconds on the monotonic clock of arrival.
 
-Times are seconds on the monotonic clock of arrival.
+No values but records, which each message changes in place: it happens for every message, many times a second.
 """
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 LONGEST_INTERVALS = 10.0  # seconds: three intervals of a slow stream count for at most this long
 SILENCE = 2.0
@@ -14,24 +19,28 @@ SILENCE = 2.0
 REMEMBERED = 6  # arrivals, hence five intervals
 
 
-class Heard(NamedTuple):
+@dataclass(slots=True)
+class Heard:
     """The latest message of one kind and the arrivals before it."""
 
     message: Any
     at: float
-    times: tuple[float, ...]
+    times: deque[float]
     """The last arrivals, this one included."""
     since: float
     """Since when it is heard without a SILENCE."""
 
 
 def heard(message: Any, at: float, before: Heard | None) -> Heard:
-    """`message`, heard at `at` after `before`."""
+    """`message`, heard at `at` after `before`, which is changed and returned if there is one."""
     if before is None:
-        return Heard(message, at, (at,), at)
-    times = before.times
-    times = (*(times if len(times) < REMEMBERED else times[1:]), at)
-    return Heard(message, at, times, at if at - before.at > SILENCE else before.since)
+        return Heard(message, at, deque((at,), REMEMBERED), at)
+    if at - before.at > SILENCE:
+        before.since = at
+    before.message = message
+    before.at = at
+    before.times.append(at)
+    return before
 
 
 def is_fresh(what: Heard | None, now: float, least: float) -> bool:
@@ -55,7 +64,8 @@ def interval(what: Heard) -> float:
     return gaps[len(gaps) // 2]
 
 
-class Observation(NamedTuple):
+@dataclass(slots=True)
+class Observation:
     """The latest message of each kind that a status is derived from; None until heard."""
 
     heartbeat: Heard | None = None
@@ -70,3 +80,7 @@ class Observation(NamedTuple):
     current_mode: Heard | None = None
     esc: Heard | None = None
     """The latest ESC telemetry that showed a turning motor."""
+
+    def __iter__(self) -> Iterator[Heard | None]:
+        """All of them."""
+        return (getattr(self, name) for name in self.__slots__)

@@ -9,10 +9,11 @@ faster.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final, NamedTuple
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
 
 from ..interface.status import TriState
-from .identity import HELICOPTER, Family
+from .identity import HELICOPTER, ROVER, Family
 
 if TYPE_CHECKING:
     from .pulse import Pulse
@@ -45,12 +46,13 @@ HELD_FAMILIES: Final = frozenset({Family.COPTER, Family.ROVER})
 Outputs = tuple[int, ...]
 
 
-class Watch(NamedTuple):
-    """What the outputs have shown."""
+@dataclass(slots=True)
+class Watch:
+    """What the outputs have shown: a record that each SERVO_OUTPUT_RAW changes in place."""
 
-    functions: Mapping[int, int] = {}
-    """SERVOn_FUNCTION by channel, as far as heard."""
-    stop: Mapping[int, int] = {}
+    functions: Mapping[int, int] = field(default_factory=dict)
+    """SERVOn_FUNCTION by channel, as far as heard; changed by `name`."""
+    stop: Mapping[int, int] = field(default_factory=dict)
     """The stop value of each motor channel, us."""
     candidate: Outputs = ()
     """Outputs while disarmed that wait for the next heartbeat to confirm the disarm."""
@@ -67,12 +69,24 @@ class Watch(NamedTuple):
     at: float | None = None
     """When the latest outputs arrived."""
     values: Outputs = ()
+    motors: tuple[int, ...] = field(init=False)
+    """The channels of MOTOR_FUNCTIONS."""
+    rotors: tuple[int, ...] = field(init=False)
+    """The channels of HELICOPTER_FUNCTIONS."""
+
+    def __post_init__(self) -> None:
+        self.name(self.functions)
+
+    def name(self, functions: Mapping[int, int]) -> None:
+        """Learn what the channels are for."""
+        self.functions = functions
+        self.motors = tuple(sorted(c for c, function in functions.items() if function in MOTOR_FUNCTIONS))
+        self.rotors = tuple(sorted(c for c, function in functions.items() if function in HELICOPTER_FUNCTIONS))
 
 
 def channels(watch: Watch, vehicle_type: int) -> tuple[tuple[int, ...], bool]:
     """The motor channels (from 1), and whether they are assumed."""
-    wanted = HELICOPTER_FUNCTIONS if vehicle_type == HELICOPTER else MOTOR_FUNCTIONS
-    known = tuple(sorted(c for c, function in watch.functions.items() if function in wanted))
+    known = watch.rotors if vehicle_type == HELICOPTER else watch.motors
     if known:
         return known, False
     return ASSUMED_CHANNELS.get(vehicle_type, ()), True
@@ -80,51 +94,45 @@ def channels(watch: Watch, vehicle_type: int) -> tuple[tuple[int, ...], bool]:
 
 def heard_outputs(
     watch: Watch, values: Outputs, vehicle_type: int, pulse: Pulse, throttle: float | None, speed: float, now: float
-) -> Watch:
-    """The watch after one more SERVO_OUTPUT_RAW; `throttle` in percent, None if not freshly heard."""
+) -> None:
+    """One more SERVO_OUTPUT_RAW; `throttle` in percent, None if not freshly heard."""
+    watch.at, watch.values = now, values
     if not pulse.armed:
-        return watch._replace(candidate=values, driven=False, held_since=None, at=now, values=values)
+        watch.candidate, watch.driven, watch.held_since = values, False, None
+        return
     motors, assumed = channels(watch, vehicle_type)
-    known = [(values[c - 1], watch.stop[c]) for c in motors if c in watch.stop and c <= len(values)]
-    off_stop = any(abs(value - stop) > OFF_STOP for value, stop in known)
-    at_stop = len(known) == len(motors) > 0 and all(abs(value - stop) <= AT_STOP for value, stop in known)
+    stop = watch.stop
+    known = [abs(values[c - 1] - stop[c]) for c in motors if c in stop and c <= len(values)]  # how far off it, us
+    complete = len(known) == len(motors)
+    off_stop = bool(known) and max(known) > OFF_STOP
+    at_stop = complete and bool(known) and max(known) <= AT_STOP
+    all_off = complete and len(known) >= SEVERAL and min(known) > OFF_STOP
     demanded = throttle is not None and throttle >= DEMAND
-    all_off = len(known) == len(motors) >= SEVERAL and all(abs(value - stop) > OFF_STOP for value, stop in known)
-    proved = watch.proved or (off_stop and demanded) or all_off
-    driven = off_stop and (proved or not assumed)
-    held_since, speed_then = watch.held_since, watch.speed_then
-    if not (at_stop and demanded and proved and watch.driven_seen):
-        held_since = None
-    elif held_since is None:
-        held_since, speed_then = now, speed
-    return watch._replace(
-        proved=proved,
-        driven=driven,
-        driven_seen=watch.driven_seen or driven,
-        held_since=held_since,
-        speed_then=speed_then,
-        at=now,
-        values=values,
-    )
+    watch.proved = watch.proved or (off_stop and demanded) or all_off
+    if not (at_stop and demanded and watch.proved and watch.driven_seen):
+        watch.held_since = None
+    elif watch.held_since is None:
+        watch.held_since, watch.speed_then = now, speed
+    watch.driven = off_stop and (watch.proved or not assumed)
+    watch.driven_seen = watch.driven_seen or watch.driven
 
 
 def heard_beat(
     watch: Watch, pulse: Pulse, before: Pulse | None, outputs_enabled: bool, vehicle_type: int, now: float
-) -> Watch:
-    """The watch after one more heartbeat: stop values are learnt while disarmed, proofs end with each arming."""
+) -> None:
+    """One more heartbeat: stop values are learnt while disarmed, proofs end with each arming."""
     if pulse.armed:
         if before is not None and not before.armed:
-            return watch._replace(candidate=(), driven_seen=False, driven=False, held_since=None)
-        return watch
-    if before is None or before.armed or not watch.candidate:
-        return watch._replace(candidate=())
-    near = now - before.runs[-1].last <= BEATS_APART
-    if not (near and outputs_enabled):
-        return watch._replace(candidate=())
-    motors, _ = channels(watch, vehicle_type)
-    learnt = {c: watch.candidate[c - 1] for c in motors if c <= len(watch.candidate)}
-    stop = {c: value for c, value in learnt.items() if value >= LEAST_PULSE}
-    return watch._replace(stop=stop, candidate=())
+            watch.candidate, watch.held_since = (), None
+            watch.driven = watch.driven_seen = False
+        return
+    candidate, watch.candidate = watch.candidate, ()
+    if before is None or before.armed or not candidate or not outputs_enabled:
+        return
+    if now - before.runs[-1].last <= BEATS_APART:
+        motors, _ = channels(watch, vehicle_type)
+        learnt = {c: candidate[c - 1] for c in motors if c <= len(candidate)}
+        watch.stop = {c: value for c, value in learnt.items() if value >= LEAST_PULSE}
 
 
 def is_at_stop(watch: Watch, vehicle_type: int) -> bool:
@@ -139,7 +147,7 @@ def is_vetoed(watch: Watch, family: Family, speed: float) -> bool:
 
     A copter that is stopped falls, whatever it did before; a rover coasts.
     """
-    return speed - (watch.speed_then if family is Family.ROVER else 0.0) > GROWTH
+    return speed - (watch.speed_then if family is ROVER else 0.0) > GROWTH
 
 
 def verdict(watch: Watch, family: Family, vehicle_type: int, speed: float, now: float) -> TriState:
@@ -153,6 +161,3 @@ def verdict(watch: Watch, family: Family, vehicle_type: int, speed: float, now: 
     if is_vetoed(watch, family, speed):
         return TriState.UNKNOWN
     return TriState.TRUE
-
-
-NOT_WATCHED: Final = Watch()

@@ -38,11 +38,13 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..mavlink.framing import Frame
+    from .horizon import Matters
     from .memory import Memory
 
 log = logging.getLogger(__name__)
 
 MOST_VEHICLES: Final = 256
+HEARTBEAT_ID: Final = 0
 COMMAND_IDS: Final = frozenset({75, 76})  # COMMAND_INT, COMMAND_LONG: heard from others
 WANTED_IDS: Final = frozenset(d.id for d in mav.MESSAGES.values() if d.type in HANDLERS) | COMMAND_IDS
 
@@ -66,7 +68,19 @@ class Ask(NamedTuple):
 class Tracked:
     """One vehicle: its handle, and once it was heard its ids and memory."""
 
-    __slots__ = ("boots", "deadline", "dirty", "handle", "ids", "memory", "parameters", "requests", "seen", "slot")
+    __slots__ = (
+        "boots",
+        "checked",
+        "deadline",
+        "dirty",
+        "handle",
+        "ids",
+        "memory",
+        "parameters",
+        "requests",
+        "seen",
+        "slot",
+    )
 
     def __init__(self, slot: Slot) -> None:
         self.slot = slot
@@ -77,10 +91,14 @@ class Tracked:
         self.requests: Requests | None = None
         self.parameters: Parameters | None = None
         self.boots = 0
-        self.seen: tuple[object, ...] = ()
+        self.seen: Matters = {}
         """What mattered at the last look."""
-        self.dirty = True
+        self.dirty = False
+        """Whether it is among those that are stirred."""
         self.deadline = math.inf
+        """Before this time (monotonic seconds) the status does not change if nothing that matters is heard."""
+        self.checked = -math.inf
+        """Up to when the passing of time is in the status."""
 
     def matches(self, system: int, component: int) -> bool:
         """True if this is the place for a newly heard autopilot."""
@@ -108,8 +126,16 @@ class MavlinkRobotHW(RobotHW):
         self._open = not slots
         """Whether every autopilot heard becomes a handle."""
         self._tracked: dict[tuple[int, int], Tracked] = {}
-        self.stirred = False
-        """Whether something was taken, since the last `read`, that may change a status."""
+        self.stirred: list[Tracked] = []
+        """The vehicles of which something was taken, since the last `read`, that may change their status."""
+        self.deadline = math.inf
+        """The first deadline of all vehicles: when `read` has something to do though nothing is stirred."""
+        self._asks_due = math.inf
+        self._ask_anew = True
+        """Whether `write` may have something to do before that: something has changed since it looked."""
+        self._passive: Container[tuple[int, int]] = ()
+        self._unheard = True
+        """Whether the handles of vehicles that were not heard are still to be told so."""
         self.ignored = 0
         """Heartbeats of autopilots that no entry of the configuration names, or beyond MOST_VEHICLES."""
         for slot in slots:
@@ -126,42 +152,33 @@ class MavlinkRobotHW(RobotHW):
 
     def take(self, frame: Frame, now: Instant) -> Tracked | None:
         """Take one frame. Returns the vehicle whose autopilot's heartbeat it is, None for everything else."""
-        ids = (frame.system, frame.component)
-        tracked = self._tracked.get(ids)
-        if frame.message_id == 0:
-            heartbeat = decode(frame)
-            if tracked is not None and not is_autopilot(heartbeat, frame.component):
-                return None
-            tracked = tracked or self._discover(heartbeat, ids, now)
-            if tracked is None:
-                return None
-            self._hear(tracked, heartbeat, now)
-            return tracked
-        if frame.message_id in COMMAND_IDS:
+        tracked = self._tracked.get((frame.system, frame.component))
+        kind = frame.message_id
+        if kind == HEARTBEAT_ID:
+            return self._take_heartbeat(tracked, frame, now)
+        if kind in COMMAND_IDS:
             self._overhear(frame, now)
-            return None
-        if tracked is None or tracked.memory is None:
-            return None
-        message = decode(frame)
-        if tracked.requests is not None:
-            tracked.requests.arrived(frame.message_id, now.mono)
-            if type(message) is mav.CommandAck:
-                tracked.requests.acknowledged(message, (self.own_system or ids[0], self.own_component), now.mono)
-        if type(message) is mav.ParamValue and tracked.parameters is not None:
-            tracked.parameters.heard(text(message.param_id))
-        self._hear(tracked, message, now)
+        elif tracked is not None and tracked.memory is not None:
+            message = decode(frame)
+            if tracked.requests is not None:
+                self._tell_askers(tracked, tracked.requests, message, kind, now)
+            self._hear(tracked, tracked.memory, message, now)
         return None
 
     def read(self, now: Instant) -> None:
         """Set the handles to what is so at `now`."""
-        self.stirred = False
-        for tracked in self._expected:
-            if tracked.memory is None and not tracked.handle.detail.inhibits:
-                unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
-                tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
-        for tracked in self._tracked.values():
-            if tracked.dirty or now.mono >= tracked.deadline:
+        if self._unheard:
+            self._tell_unheard(now)
+        if now.mono >= self.deadline:
+            self._look_again(now.mono)
+            for tracked in self._tracked.values():
+                if now.mono >= tracked.deadline and not tracked.dirty:
+                    self._stir(tracked)
+        if self.stirred:
+            for tracked in self.stirred:
                 self._evaluate(tracked, now)
+            self.stirred.clear()
+            self.deadline = min(tracked.deadline for tracked in self._tracked.values())
 
     def explain(self, now: Instant) -> None:
         """Bring the evidence in the handles up to `now`; `read` renews it only when a status may have changed."""
@@ -178,6 +195,10 @@ class MavlinkRobotHW(RobotHW):
 
     def write(self, now: Instant, passive: Container[tuple[int, int]] = ()) -> list[Ask]:
         """What is to be asked of the autopilots at `now`; nothing of those on `passive` links."""
+        if now.mono < self._asks_due and not self._ask_anew and passive == self._passive:
+            return []
+        self._passive = passive
+        self._asks_due = math.inf
         asks = []
         for ids, tracked in self._tracked.items():
             memory = tracked.memory
@@ -195,38 +216,49 @@ class MavlinkRobotHW(RobotHW):
                 request = tracked.parameters.due(now.mono)
                 if request is not None:
                     asks.append(Ask(*ids, request))
+                self._asks_due = min(self._asks_due, tracked.parameters.next_due())
+            self._asks_due = min(self._asks_due, tracked.requests.next_due())
+        self._ask_anew = bool(asks)
         return asks
 
     def conflict(self, ids: tuple[int, int], now: Instant) -> None:
         """Two autopilots that claim the ids of this vehicle were heard on different ways."""
         tracked = self._tracked.get(ids)
         if tracked is not None and tracked.memory is not None:
-            latches = causes.announce(tracked.memory.latches, 9002, None, now, "clocks of two autopilots")
-            tracked.memory = tracked.memory._replace(latches=latches)
-            tracked.dirty = self.stirred = True
+            memory = tracked.memory
+            memory.latches = causes.announce(memory.latches, 9002, None, now, "clocks of two autopilots")
+            self._stir(tracked)
 
-    def next_due(self) -> float:
-        """When (monotonic seconds) `read` or `write` has something to do, if nothing arrives before."""
-        due = math.inf
-        for tracked in self._tracked.values():
-            due = min(due, tracked.deadline)
-            if tracked.requests is not None and tracked.handle.detail.link is LinkState.CONNECTED:
-                due = min(due, tracked.requests.next_due())
-                if tracked.parameters is not None:
-                    due = min(due, tracked.parameters.next_due())
-        return due
+    def next_due(self, until: float = -math.inf) -> float:
+        """When (monotonic seconds) `read` or `write` has something to do, if nothing arrives before.
+
+        What falls due before `until` does so in fact; later, it may turn out that nothing has ended by then.
+        """
+        if self.deadline < until:
+            self._look_again(until)
+        return min(self.deadline, self._asks_due)
 
     def forget(self) -> None:
         """Begin anew, as if nothing had been heard (a new segment of a log). Handles keep their vehicles."""
         for tracked in self._tracked.values():
             tracked.memory = None
             tracked.boots = 0
-            tracked.dirty, tracked.deadline = True, math.inf
+            tracked.dirty, tracked.deadline, tracked.checked = False, math.inf, -math.inf
             system, component = tracked.ids or (None, None)
             tracked.handle.status = RobotStatus()
             tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)
             tracked.handle.heard_at = None
             tracked.handle.evidence = {}
+        self.stirred.clear()
+        self.deadline, self._unheard = math.inf, True
+
+    def _tell_unheard(self, now: Instant) -> None:
+        """Once: a vehicle that was never heard cannot move as far as one knows."""
+        self._unheard = False
+        for tracked in self._expected:
+            if tracked.memory is None:
+                unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
+                tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
 
     def _overhear(self, frame: Frame, now: Instant) -> None:
         """A command of a ground station to one of the vehicles."""
@@ -234,7 +266,33 @@ class MavlinkRobotHW(RobotHW):
         for (system, component), tracked in self._tracked.items():
             addressed = message.target_system == system and message.target_component in (0, component)
             if addressed and tracked.memory is not None:
-                tracked.memory = overheard(tracked.memory, message, (frame.system, frame.component), now)
+                overheard(tracked.memory, message, (frame.system, frame.component), now)
+
+    def _take_heartbeat(self, tracked: Tracked | None, frame: Frame, now: Instant) -> Tracked | None:
+        """The vehicle, if it is an autopilot's heartbeat."""
+        heartbeat = decode(frame)
+        if tracked is None:
+            tracked = self._discover(heartbeat, (frame.system, frame.component), now)
+        elif not is_autopilot(heartbeat, frame.component):
+            return None
+        if tracked is None:
+            return None
+        tracked.handle.heard_at = now.mono
+        if tracked.memory is None:
+            tracked.memory = begin(heartbeat, now)
+            self._stir(tracked)
+        else:
+            self._hear(tracked, tracked.memory, heartbeat, now)
+        return tracked
+
+    def _tell_askers(self, tracked: Tracked, requests: Requests, message: Any, kind: int, now: Instant) -> None:
+        """What came need not be asked for."""
+        requests.arrived(kind, now.mono)
+        if type(message) is mav.CommandAck and tracked.ids is not None:
+            requests.acknowledged(message, (self.own_system or tracked.ids[0], self.own_component), now.mono)
+            self._ask_anew = True
+        elif type(message) is mav.ParamValue and tracked.parameters is not None:
+            tracked.parameters.heard(text(message.param_id))
 
     def _discover(self, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant) -> Tracked | None:
         """The place of an autopilot that is heard for the first time."""
@@ -254,26 +312,37 @@ class MavlinkRobotHW(RobotHW):
         log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
         return tracked
 
-    def _hear(self, tracked: Tracked, message: Any, now: Instant) -> None:
-        if tracked.memory is None:
-            tracked.memory = begin(message, now)
-        else:
-            tracked.memory = hear(tracked.memory, message, now, self.options)
-        if not tracked.dirty:
-            tracked.dirty = self._hasty or horizon.may_matter(tracked.memory, message, tracked.seen, self.options)
-        self.stirred = self.stirred or tracked.dirty
-        if type(message) is mav.Heartbeat:
-            tracked.handle.heard_at = now.mono
-        if tracked.memory.boots != tracked.boots:
-            tracked.boots = tracked.memory.boots
-            log.info("vehicle %d.%d has rebooted", *(tracked.ids or (0, 0)))
-            if tracked.requests is not None:
-                tracked.requests.restart(now.mono)
+    def _hear(self, tracked: Tracked, memory: Memory, message: Any, now: Instant) -> None:
+        options = self.options
+        hear(memory, message, now, options)
+        if tracked.dirty:
+            return
+        if self._hasty or horizon.may_matter(memory, message, tracked.seen, options):
+            self._stir(tracked)
+        elif type(message) in horizon.SPEEDS:
+            at = horizon.settles_at(memory, message)
+            if now.mono < at < tracked.deadline:
+                tracked.deadline = at
+                self.deadline = min(self.deadline, at)
+
+    def _stir(self, tracked: Tracked) -> None:
+        tracked.dirty = True
+        self.stirred.append(tracked)
+
+    def _look_again(self, until: float) -> None:
+        """Put off the deadlines up to `until` of vehicles of which what would have ended was heard again meanwhile."""
+        for tracked in self._tracked.values():
+            if tracked.deadline <= until and tracked.memory is not None:
+                tracked.deadline = horizon.next_change(tracked.memory, tracked.checked, self.options)
+        self.deadline = min(tracked.deadline for tracked in self._tracked.values())
 
     def _evaluate(self, tracked: Tracked, now: Instant) -> None:
         if tracked.memory is None or tracked.ids is None:
             return
-        memory = tracked.memory = pass_time(tracked.memory, now, self.options)
+        memory = tracked.memory
+        if memory.boots != tracked.boots:
+            self._tell_reboot(tracked, memory, now)
+        pass_time(memory, now, self.options)
         handle = tracked.handle
         derived = derive(memory, tracked.ids, handle.detail, now, self.options)
         self._log_link(tracked, derived.detail.link)
@@ -283,12 +352,23 @@ class MavlinkRobotHW(RobotHW):
             handle.detail = derived.detail
         handle.evidence = derived.evidence
         tracked.dirty = False
+        tracked.checked = now.mono
         tracked.seen = horizon.matters(memory, self.options)
         lost = derived.detail.link is LinkState.LOST
         tracked.deadline = math.inf if lost else horizon.next_change(memory, now.mono, self.options)
 
+    def _tell_reboot(self, tracked: Tracked, memory: Memory, now: Instant) -> None:
+        tracked.boots = memory.boots
+        log.info("vehicle %d.%d has rebooted", *(tracked.ids or (0, 0)))
+        if tracked.requests is not None:
+            tracked.requests.restart(now.mono)
+            self._ask_anew = True
+
     def _log_link(self, tracked: Tracked, state: LinkState) -> None:
         before = tracked.handle.detail.link
+        if state is before:
+            return
+        self._ask_anew = True
         ids = tracked.ids or (0, 0)
         if state is LinkState.LOST and before is LinkState.CONNECTED:
             log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, self.options.heartbeat_timeout)

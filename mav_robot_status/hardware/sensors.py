@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from .identity import Stack
+from .identity import PX4, Stack
 
 if TYPE_CHECKING:
     from ..clock import Instant
@@ -86,7 +86,7 @@ def faulty_mask(status: SysStatus, stack: Stack) -> int:
     """
     low = status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health
     high = status.onboard_control_sensors_enabled_extended & ~status.onboard_control_sensors_health_extended
-    if stack is not Stack.PX4:
+    if stack is not PX4:
         low &= status.onboard_control_sensors_present
         high &= status.onboard_control_sensors_present_extended
     return low | high << 32
@@ -123,14 +123,14 @@ def standing(faults: Faults, stack: Stack, armed: bool, now: float) -> list[tupl
 def is_ready(status: SysStatus, stack: Stack) -> bool:
     """True if the pre-arm checks pass, as far as SYS_STATUS says so. PX4 sets the bit in *health* only."""
     ready = status.onboard_control_sensors_health & PREARM_CHECK
-    if stack is not Stack.PX4:
+    if stack is not PX4:
         ready &= status.onboard_control_sensors_present & status.onboard_control_sensors_enabled
     return bool(ready)
 
 
 def tells_readiness(status: SysStatus, stack: Stack) -> bool:
     """True if this SYS_STATUS says anything about the pre-arm checks."""
-    if stack is Stack.PX4:
+    if stack is PX4:
         return True
     return bool(status.onboard_control_sensors_present & status.onboard_control_sensors_enabled & PREARM_CHECK)
 

@@ -22,6 +22,9 @@ class IndustrialRobotStatusInterface:
     def __init__(self) -> None:
         self._handles: dict[str, IndustrialRobotStatusHandle] = {}
 
+    def __len__(self) -> int:
+        return len(self._handles)
+
     def register_handle(self, handle: IndustrialRobotStatusHandle) -> None:
         """Make a handle known. A second registration of a name replaces the first, with a warning in the log."""
         if handle.name in self._handles:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from struct import Struct
 from typing import Any, NamedTuple, TypeVar
 
 from mav_robot_status.clock import Instant
@@ -24,8 +25,11 @@ BLOCK = 1 << 16
 """Bytes handed on at once."""
 STAMP_SIZE = 8
 """Bytes of time stamp before each frame."""
+STAMP = Struct(">Q").unpack
 
 T = TypeVar("T")
+
+new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
 
 
 @dataclass
@@ -63,7 +67,7 @@ def timed(pieces: Iterable[Piece[T]], counts: Counts) -> Iterator[Stamped]:
     jumped = False
     for stamp, following, what in pieces:
         # Nearly every record is neither before the last one nor after the next one.
-        if not (0 <= stamp - latest <= DAY_US and stamp <= following):
+        if not (latest <= stamp <= following and stamp - latest <= DAY_US):
             if latest == _NEVER:
                 latest = segment = stamp
             elif _is_jump(latest, stamp, following):
@@ -78,7 +82,7 @@ def timed(pieces: Iterable[Piece[T]], counts: Counts) -> Iterator[Stamped]:
                 counts.held += 1
                 stamp = latest
         latest = stamp
-        yield Stamped(Instant(mono + (stamp - segment) * 1e-6, stamp), what, jumped)
+        yield new(Stamped, (new(Instant, (mono + (stamp - segment) * 1e-6, stamp)), what, jumped))
         jumped = False
 
 
@@ -99,7 +103,10 @@ def _is_outlier(latest: int, stamp: int, following: int) -> bool:
 
 def stamp_of(raw: bytes, otherwise: int) -> int:
     """The stamp in front of a frame, whatever it says; `otherwise` if the log begins in the middle of it."""
-    return int.from_bytes(raw, "big") if len(raw) == STAMP_SIZE else otherwise
+    if len(raw) != STAMP_SIZE:
+        return otherwise
+    (stamp,) = STAMP(raw)
+    return stamp  # type: ignore[no-any-return]
 
 
 class LogReader:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from .definitions import MESSAGES
 
 if TYPE_CHECKING:
     from .framing import Frame
+
+
+READERS: Final = {d.id: (d.type, d.layout.size, d.layout.unpack) for d in MESSAGES.values()}
+new: Final = tuple.__new__  # as in `framing`
 
 
 def decode(frame: Frame) -> Any:
@@ -16,11 +20,14 @@ def decode(frame: Frame) -> Any:
     A payload that MAVLink 2 trimmed, or that an older definition without the extension fields made shorter, is filled
     up with zeros; bytes beyond the layout (a newer definition) are ignored. Never raises.
     """
-    definition = MESSAGES.get(frame.message_id)
-    if definition is None:
+    reader = READERS.get(frame.message_id)
+    if reader is None:
         return None
-    size = definition.layout.size
-    return definition.type._make(definition.layout.unpack(frame.payload[:size].ljust(size, b"\0")))
+    kind, size, unpack = reader
+    payload = frame.payload
+    if len(payload) != size:
+        payload = payload[:size].ljust(size, b"\0")
+    return new(kind, unpack(payload))
 
 
 def text(raw: bytes) -> str:

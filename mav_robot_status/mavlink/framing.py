@@ -39,6 +39,7 @@ HEADER_V2 = Struct("<xBBxB2s3s").unpack_from  # length, incompatibility flags, s
 CRC = Struct(">H").unpack_from  # of mirrored bytes
 MAGIC = re.compile(b"[\xfd\xfe]")
 VALID, OPEN, WRONG = range(3)
+new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
 
 # MAVLink's CRC-16/MCRF4XX is the standard library's crc_hqx on bytes whose bits are mirrored.
 MIRROR: Final = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
@@ -157,7 +158,7 @@ class Parser:
         expected = self._expected
         keep_all = self._keep_all
         frames: list[Frame] = []
-        good = 0
+        good = old = 0
         stamped = i = self._stamp_size
         before = -1
         if not self._in_step:
@@ -205,7 +206,7 @@ class Parser:
                 self._gap(source, sequence)
             if flags:
                 if flags == OLD:
-                    self.counters.frames_v1 += 1
+                    old += 1
                 elif flags == SIGNED:
                     self.counters.signed += 1
                 else:
@@ -217,11 +218,12 @@ class Parser:
                 raw = data[before:following] if keep_all or flags == SIGNED else b""
                 version = 1 if flags == OLD else 2
                 stamp = data[before - stamped : before]
-                frames.append(Frame(entry[1], source[0], source[1], sequence, payload, raw, version, stamp))
+                frames.append(new(Frame, (entry[1], source[0], source[1], sequence, payload, raw, version, stamp)))
         self._tail = data[i - stamped :]
         if stamped and before >= 0:
             self.last_stamp = data[before - stamped : before]
         self.counters.frames += good
+        self.counters.frames_v1 += old
         return frames
 
     def _gap(self, source: bytes, sequence: int) -> None:

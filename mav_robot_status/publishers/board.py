@@ -173,10 +173,12 @@ def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tu
             yield group if group == "link" else name, value, old_value
     for group, one in (("errors", "error"), ("inhibits", "inhibit")):
         old, new = _causes(before, group), _causes(after, group)
-        for cause in old.keys() - new.keys():
-            yield one, {**old[cause], "begins": False}, None
-        for cause in new.keys() - old.keys():
-            yield one, {**new[cause], "begins": True}, None
+        for cause in old:
+            if cause not in new:
+                yield one, {**old[cause], "begins": False}, None
+        for cause in new:
+            if cause not in old:
+                yield one, {**new[cause], "begins": True}, None
 
 
 def _member(line: Mapping[str, Any], group: str, name: str) -> Any:

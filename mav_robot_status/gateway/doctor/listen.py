@@ -21,7 +21,7 @@ from ..explain import NO_OUTPUT, explanation, silent
 from ..live import Live
 from ..plant import Plant
 from ..recorded import Recording
-from ..replay import NEVER, Nobody, run_through
+from ..replay import Nobody, run_through
 from . import probes
 from .advice import protocol
 from .collector import Collector
@@ -168,11 +168,8 @@ def _read(config: Config, base: Findings) -> Findings:
     recording = _Whole(base.url.device)
     collector = Collector()
     plant = Plant(config, Nobody(), NO_OUTPUT, patient=True)
-    first = last = NEVER
-    for now, _ in run_through(plant, recording.overheard(collector)):
-        first = now if first is NEVER else first
-        last = now
-    known = dataclasses.replace(base, seconds=round(last.mono - first.mono, 1))
+    last = run_through(plant, recording.overheard(collector))  # the first record is at 0
+    known = dataclasses.replace(base, seconds=round(last.mono, 1))
     found = collector.findings(known, _statuses(plant.hw, last), recording.counters())
     return dataclasses.replace(found, size=os.path.getsize(base.url.device))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from ...interface.status import Inhibit, RobotMode, TriState
 from .. import sensors
 from ..flight_mode import is_initialising
-from ..identity import HIL, Stack
+from ..identity import ARDUPILOT, HIL, PX4
 from .view import BOOT, CALIBRATING, EMERGENCY, POWEROFF, TERMINATED, TRUE, UNINIT, View
 
 if TYPE_CHECKING:
@@ -28,9 +28,9 @@ def inhibits(view: View, mode: FlightMode, stopped: TriState, before: Detail, no
     not_ready = memory.not_ready.text if memory.not_ready is not None else None
     failsafe = memory.failsafe.text if memory.failsafe is not None else None
     initialising = is_initialising(view.heartbeat, memory.stack, memory.family)
-    switch = (
-        memory.stack is Stack.ARDUPILOT and view.status is not None and sensors.safety_switch_on(view.status)
-    ) or (not view.armed and not_ready == "Preflight Fail: Press safety button first")
+    switch = (memory.stack is ARDUPILOT and view.status is not None and sensors.safety_switch_on(view.status)) or (
+        not view.armed and not_ready == "Preflight Fail: Press safety button first"
+    )
     termination = memory.latches.get(1002)
     reasons: dict[str, str | None] = {}
     if not view.armed:
@@ -41,7 +41,7 @@ def inhibits(view: View, mode: FlightMode, stopped: TriState, before: Detail, no
         reasons["SAFETY_SWITCH"] = None
     if not view.armed and _is_not_ready(view):
         reasons["PREARM_FAILING"] = not_ready
-    if initialising or state == BOOT or (state == UNINIT and memory.stack is not Stack.PX4):
+    if initialising or state == BOOT or (state == UNINIT and memory.stack is not PX4):
         reasons["INITIALISING"] = None
     elif state == CALIBRATING:
         reasons["CALIBRATING"] = None
@@ -63,7 +63,7 @@ def inhibits(view: View, mode: FlightMode, stopped: TriState, before: Detail, no
 def _is_not_ready(view: View) -> bool:
     """The pre-arm checks fail, as far as the vehicle says so."""
     stack = view.memory.stack
-    if stack is Stack.PX4 and view.state == UNINIT:
+    if stack is PX4 and view.state == UNINIT:
         return True
     if view.status is None or not sensors.tells_readiness(view.status, stack):
         return False

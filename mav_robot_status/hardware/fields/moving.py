@@ -7,7 +7,7 @@ from typing import Final
 from ...interface.status import Evidence
 from .. import motion
 from ..hearing.movement import speed_over_ground
-from ..identity import AIRCRAFT, Stack
+from ..identity import AIRCRAFT, ARDUPILOT
 from ..observation import is_fresh
 from .view import FALSE, STANDBY, TRUE, UNKNOWN, Finding, View
 
@@ -29,7 +29,7 @@ def in_motion(view: View) -> Finding:
     source, at = _velocity_source(view)
     slow = memory.motion.slow_since is not None
     if source is not None:
-        value = motion.settle(memory.motion, now).value
+        value = motion.settled(memory.motion, now)
         why = Evidence("speed and rotation, with hysteresis", source, at)
         if value is TRUE and not view.armed and _gps_contradicts(view):
             # seen after a crash: the estimate ran away at 36 m/s while the vehicle lay on its back
@@ -56,7 +56,7 @@ def _gps_stands_still(view: View) -> bool:
     """
     memory = view.memory
     fresh = is_fresh(memory.observation.gps, view.now, motion.FRESH)
-    return fresh and motion.settle(memory.gps_motion, view.now).value is FALSE
+    return fresh and motion.settled(memory.gps_motion, view.now) is FALSE
 
 
 def _gps_contradicts(view: View) -> bool:
@@ -69,7 +69,7 @@ def _gps_contradicts(view: View) -> bool:
 
 def _on_ground(view: View) -> bool:
     """ArduPilot's STANDBY: its own land detector says landed."""
-    return view.memory.stack is Stack.ARDUPILOT and view.state == STANDBY
+    return view.memory.stack is ARDUPILOT and view.state == STANDBY
 
 
 def _velocity_source(view: View) -> tuple[str | None, float | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...interface.status import Evidence
 from .. import causes, estop, motion, outputs, sensors
 from ..hearing.movement import driving_speed
-from ..identity import HIL, Family, Stack
+from ..identity import ARDUPILOT, HIL, PLANE, PX4
 from ..observation import is_fresh
 from .view import FALSE, TERMINATED, TRUE, UNKNOWN, Finding, View, beat
 
@@ -13,9 +13,9 @@ from .view import FALSE, TERMINATED, TRUE, UNKNOWN, Finding, View, beat
 def e_stopped(view: View) -> Finding:
     """Whether an emergency stop is engaged; see `estop` for what each autopilot shows."""
     stack = view.memory.stack
-    if stack is Stack.PX4:
+    if stack is PX4:
         found = _px4_stop(view)
-    elif stack is Stack.ARDUPILOT:
+    elif stack is ARDUPILOT:
         found = _ardupilot_stop(view)
     elif view.state == TERMINATED:
         found = TRUE, beat(view, "state FLIGHT_TERMINATION")
@@ -73,7 +73,7 @@ def _watched(view: View) -> Finding:
     turning = memory.observation.esc
     if turning is not None and is_fresh(turning, now, motion.FRESH):
         # recorded: a plane's propeller turns on after a stop; wheels turn the motors of a rover that coasts
-        if memory.family is not Family.PLANE and not (fresh and outputs.is_at_stop(watch, memory.vehicle_type)):
+        if memory.family is not PLANE and not (fresh and outputs.is_at_stop(watch, memory.vehicle_type)):
             return FALSE, Evidence("a motor turns", "ESC telemetry: rpm", turning.at)
         if not (fresh and watch.driven):
             return UNKNOWN, Evidence("a motor turns, perhaps without being driven", "ESC telemetry: rpm", turning.at)

@@ -1,4 +1,4 @@
-"""One message more: memory and message in, memory out. Each kind of message has its function in the table below."""
+"""One message more: message in, memory changed. Each kind of message has its function in the table below."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["HANDLERS", "hear", "overheard", "pass_time"]
 
-Handler = Callable[[Memory, Any, Instant, "HardwareOptions"], Memory]
+Handler = Callable[[Memory, Any, Instant, "HardwareOptions"], None]
 
 HANDLERS: Final[dict[type, Handler]] = {
     mav.Heartbeat: beats.heartbeat,
@@ -43,7 +43,8 @@ HANDLERS: Final[dict[type, Handler]] = {
 }
 
 
-def hear(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
-    """The memory after one more message of this vehicle; a message of no interest changes nothing."""
+def hear(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:
+    """Change the memory by one more message of this vehicle; a message of no interest changes nothing."""
     handler = HANDLERS.get(type(message))
-    return memory if handler is None else handler(memory, message, now, options)
+    if handler is not None:
+        handler(memory, message, now, options)

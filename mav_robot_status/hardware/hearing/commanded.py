@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...mavlink.definitions import CommandAck, CommandInt, CommandLong
 from .. import causes, commands, estop
-from ..identity import Family, Stack
+from ..identity import ARDUPILOT, Family, Stack
 
 if TYPE_CHECKING:
     from ...clock import Instant
@@ -19,28 +19,28 @@ TERMINATES: dict[Stack, frozenset[Family]] = {
 }
 
 
-def overheard(memory: Memory, message: CommandLong | CommandInt, sender: tuple[int, int], now: Instant) -> Memory:
+def overheard(memory: Memory, message: CommandLong | CommandInt, sender: tuple[int, int], now: Instant) -> None:
     """A command of `sender` to this vehicle passed by."""
     asked = commands.asked(message, sender, now)
-    return memory if asked is None else memory._replace(asked=asked)
+    if asked is not None:
+        memory.asked = asked
 
 
-def command_ack(memory: Memory, message: CommandAck, now: Instant, options: HardwareOptions) -> Memory:
+def command_ack(memory: Memory, message: CommandAck, now: Instant, options: HardwareOptions) -> None:
     """COMMAND_ACK: the vehicle has done what it was asked."""
     asked = memory.asked
     if asked is None or not commands.is_answered(asked, message, now):
-        return memory
-    memory = memory._replace(asked=None)
+        return
+    memory.asked = None
     if message.result != commands.ACCEPTED:
-        return memory
+        return
     source = f"COMMAND_ACK: accepted command {asked.command} of {asked.sender[0]}.{asked.sender[1]}"
     if asked.command == commands.DO_FLIGHTTERMINATION:
         if asked.param1 >= 0.5 and memory.family in TERMINATES.get(memory.stack, frozenset()):
-            return memory._replace(latches=causes.announce(memory.latches, 1002, None, now, source))
-        return memory
-    honoured = memory.stack is Stack.ARDUPILOT and memory.family in estop.HONOURED_BY
+            memory.latches = causes.announce(memory.latches, 1002, None, now, source)
+        return
+    honoured = memory.stack is ARDUPILOT and memory.family in estop.HONOURED_BY
     known = honoured and asked.param1 == commands.MOTOR_ESTOP
     if known and asked.param2 in (commands.LOW, commands.HIGH):
-        stop = estop.said(memory.stop, asked.param2 == commands.HIGH, None, now, source)
-        return memory._replace(stop=stop, assumed_free=False)
-    return memory
+        memory.stop = estop.said(memory.stop, asked.param2 == commands.HIGH, None, now, source)
+        memory.assumed_free = False

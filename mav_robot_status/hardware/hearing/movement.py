@@ -6,12 +6,10 @@ import math
 from struct import unpack
 from typing import TYPE_CHECKING, Any, Final
 
-from ...interface.status import TriState
 from ...mavlink import definitions as mav
-from .. import boot as boot_rules
 from .. import estop, motion, outputs, sensors
-from ..identity import SURFACE_BOAT, Family, Stack
-from ..memory import observed
+from ..boot import heard_clock
+from ..identity import ARDUPILOT, INAV, ROVER, SURFACE_BOAT
 from ..observation import Heard, heard, is_fresh
 from .beats import rebooted
 
@@ -25,75 +23,77 @@ FIX_3D: Final = 3  # GPS_FIX_TYPE
 NO_SPEED: Final = 0xFFFF  # GPS_RAW_INT.vel
 
 
-def extended_sys_state(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
+def extended_sys_state(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:
     """EXTENDED_SYS_STATE: the landed state."""
-    return observed(memory, extended_sys_state=heard(message, now.mono, memory.observation.extended_sys_state))
+    seen = memory.observation
+    seen.extended_sys_state = heard(message, now.mono, seen.extended_sys_state)
 
 
-def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions) -> Memory:
+def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions) -> None:
     """GLOBAL_POSITION_INT: the first choice for speed."""
-    memory, boot = _clock(memory, message.time_boot_ms, now)
-    position = heard(message, now.mono, memory.observation.global_position)
+    at = now.mono
+    if heard_clock(memory.boot, message.time_boot_ms, at):
+        rebooted(memory, memory.boot, now)
+    seen = memory.observation
+    seen.global_position = heard(message, at, seen.global_position)
     velocity = message.vx / 100, message.vy / 100, message.vz / 100
     speed = _speed(memory, velocity, not any(velocity), message.lat == 0 and message.lon == 0)
-    return memory._replace(
-        boot=boot,
-        observation=memory.observation._replace(global_position=position),
-        motion=_moved(memory, memory.motion, speed, now, options),
-    )
+    _moved(memory, memory.motion, speed, at, options)
 
 
-def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> Memory:
+def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> None:
     """LOCAL_POSITION_NED: the speed while no global position is fresh."""
-    memory, boot = _clock(memory, message.time_boot_ms, now)
-    moving = memory.motion
-    if not is_fresh(memory.observation.global_position, now.mono, motion.FRESH):
+    at = now.mono
+    if heard_clock(memory.boot, message.time_boot_ms, at):
+        rebooted(memory, memory.boot, now)
+    seen = memory.observation
+    seen.local_position = heard(message, at, seen.local_position)
+    if not is_fresh(seen.global_position, at, motion.FRESH):
         velocity = message.vx, message.vy, message.vz
-        moving = _moved(memory, moving, _speed(memory, velocity, not any(velocity)), now, options)
-    position = heard(message, now.mono, memory.observation.local_position)
-    return memory._replace(boot=boot, observation=memory.observation._replace(local_position=position), motion=moving)
+        speed = _speed(memory, velocity, not any(velocity))
+        _moved(memory, memory.motion, speed, at, options)
 
 
-def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> Memory:
+def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> None:
     """VFR_HUD: the last choice for speed; the throttle for the output watch."""
-    before = memory.observation
-    observation = before._replace(vfr_hud=heard(message, now.mono, before.vfr_hud))
-    if is_fresh(before.global_position, now.mono, motion.FRESH) or is_fresh(
-        before.local_position, now.mono, motion.FRESH
-    ):
-        return memory._replace(observation=observation)
+    at = now.mono
+    seen = memory.observation
+    seen.vfr_hud = heard(message, at, seen.vfr_hud)
+    if is_fresh(seen.global_position, at, motion.FRESH) or is_fresh(seen.local_position, at, motion.FRESH):
+        return
     still = message.groundspeed == 0  # whatever the climb, which comes from the barometer
     speed = _speed(memory, (message.groundspeed, 0.0, message.climb), still)
-    return memory._replace(observation=observation, motion=_moved(memory, memory.motion, speed, now, options))
+    _moved(memory, memory.motion, speed, at, options)
 
 
-def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> Memory:
+def gps_raw_int(memory: Memory, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> None:
     """GPS_RAW_INT: whether the receiver itself stands still."""
     if message.fix_type < FIX_3D or message.vel == NO_SPEED:
-        return memory._replace(gps_motion=motion.UNKNOWN)
-    return memory._replace(
-        observation=memory.observation._replace(gps=heard(message, now.mono, memory.observation.gps)),
-        gps_motion=_moved(memory, memory.gps_motion, message.vel / 100, now, options),
-    )
+        memory.gps_motion = motion.Motion()
+        return
+    at = now.mono
+    seen = memory.observation
+    seen.gps = heard(message, at, seen.gps)
+    _moved(memory, memory.gps_motion, message.vel / 100, at, options)
 
 
-def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> Memory:
+def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: HardwareOptions) -> None:
     """ATTITUDE: rotation."""
-    memory, boot = _clock(memory, message.time_boot_ms, now)
-    rotating = heard(message, now.mono, memory.observation.attitude)
-    return memory._replace(boot=boot, observation=memory.observation._replace(attitude=rotating))
+    at = now.mono
+    if heard_clock(memory.boot, message.time_boot_ms, at):
+        rebooted(memory, memory.boot, now)
+    seen = memory.observation
+    seen.attitude = heard(message, at, seen.attitude)
+    if memory.vehicle_type == SURFACE_BOAT:  # they always roll
+        memory.turning = fastest(message.yawspeed)
+    else:
+        memory.turning = fastest(message.yawspeed, message.rollspeed, message.pitchspeed)
 
 
-def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> Memory:
+def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
     """SYSTEM_TIME: the autopilot's clock."""
-    memory, boot = _clock(memory, message.time_boot_ms, now)
-    return memory._replace(boot=boot)
-
-
-def _clock(memory: Memory, time_boot_ms: int, now: Instant) -> tuple[Memory, boot_rules.Boot]:
-    """The boot as this clock tells it, and the memory: begun anew if the clock shows a reboot."""
-    boot, anew = boot_rules.heard_clock(memory.boot, time_boot_ms, now.mono)
-    return (rebooted(memory, boot, now) if anew else memory), boot
+    if heard_clock(memory.boot, message.time_boot_ms, now.mono):
+        rebooted(memory, memory.boot, now)
 
 
 def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, nowhere: bool = False) -> float | None:
@@ -102,17 +102,17 @@ def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, no
     ArduPilot sends exactly zero (and its last position) when it has none, and up to 6 m/s at rest while its estimator
     is unhealthy; INAV sends zero without GPS.
     """
-    if not all(map(math.isfinite, velocity)):
+    if not math.isfinite(sum(velocity)):
         return None
     status = memory.observation.sys_status
-    if memory.stack is Stack.ARDUPILOT:
+    if memory.stack is ARDUPILOT:
         if still and (nowhere or status is None or not sensors.estimate_is_healthy(status.message)):
             return None
         if not memory.pulse.armed and status is not None and sensors.estimate_is_faulty(status.message):
             return None
-    elif memory.stack is Stack.INAV and still and not _has_gps(status):
+    elif memory.stack is INAV and still and not _has_gps(status):
         return None
-    return math.hypot(*velocity[:2]) if memory.family is Family.ROVER else math.hypot(*velocity)
+    return math.hypot(*velocity[:2]) if memory.family is ROVER else math.hypot(*velocity)
 
 
 def _has_gps(status: Heard | None) -> bool:
@@ -121,21 +121,21 @@ def _has_gps(status: Heard | None) -> bool:
     )
 
 
-def rotation(memory: Memory, now: float) -> float:
-    """Rotation in rad/s: about the vertical for boats, which always roll; 0 while not freshly heard."""
-    attitude = memory.observation.attitude
-    if attitude is None or not is_fresh(attitude, now, motion.FRESH):
-        return 0.0
-    m: mav.Attitude = attitude.message
-    rates = (m.yawspeed,) if memory.vehicle_type == SURFACE_BOAT else (m.rollspeed, m.pitchspeed, m.yawspeed)
-    return max([abs(rate) for rate in rates if math.isfinite(rate)], default=0.0)
+def fastest(*rates: float) -> float:
+    """The greatest of some rates, whatever their signs; those that are no numbers do not count."""
+    found = 0.0
+    for rate in rates:
+        if found < rate < math.inf:
+            found = rate
+        elif found < -rate < math.inf:
+            found = -rate
+    return found
 
 
-def _moved(
-    memory: Memory, before: motion.Motion, speed: float | None, now: Instant, options: HardwareOptions
-) -> motion.Motion:
-    """A motion after one more sample of speed."""
-    return motion.moved(before, speed, rotation(memory, now.mono), memory.pulse.armed, options, now.mono)
+def _moved(memory: Memory, moving: motion.Motion, speed: float | None, now: float, options: HardwareOptions) -> None:
+    """One more sample of speed."""
+    rotation = memory.turning if is_fresh(memory.observation.attitude, now, motion.FRESH) else 0.0
+    motion.moved(moving, speed, rotation, memory.pulse.armed, options, now)
 
 
 def speed_over_ground(memory: Memory) -> float:
@@ -149,52 +149,49 @@ def driving_speed(memory: Memory) -> float:
     hud = memory.observation.vfr_hud
     if hud is None:
         return 0.0
-    speed: float = hud.message.groundspeed if memory.family is Family.ROVER else hud.message.climb
+    speed: float = hud.message.groundspeed if memory.family is ROVER else hud.message.climb
     return speed if math.isfinite(speed) else 0.0
 
 
-def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, options: HardwareOptions) -> Memory:
+def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, options: HardwareOptions) -> None:
     """SERVO_OUTPUT_RAW: the output watch of ArduPilot."""
-    if memory.stack is not Stack.ARDUPILOT or not options.watch_outputs or message.port != 0:
-        return memory
+    if memory.stack is not ARDUPILOT or not options.watch_outputs or message.port != 0:
+        return
+    values = message[1:9] + message[10:18]
     hud = memory.observation.vfr_hud
     throttle = hud.message.throttle if hud is not None and is_fresh(hud, now.mono, motion.FRESH) else None
-    values = (*message[1:9], *message[10:18])
-    watch = outputs.heard_outputs(
+    outputs.heard_outputs(
         memory.watch, values, memory.vehicle_type, memory.pulse, throttle, driving_speed(memory), now.mono
     )
-    stop = memory.stop
-    if watch.driven and stop.said is TriState.TRUE:
-        stop = estop.NOTHING  # a motor that is driven is not stopped, whatever was said before
-    return memory._replace(watch=watch, stop=stop)
+    if memory.watch.driven and memory.stop.said is motion.TRUE:
+        memory.stop = estop.NOTHING  # a motor that is driven is not stopped, whatever was said before
 
 
-def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: HardwareOptions) -> Memory:
+def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: HardwareOptions) -> None:
     """PARAM_VALUE: SERVOn_FUNCTION says which outputs drive motors."""
     name = message.param_id.split(b"\0")[0]
     number, value = name[5:-9], message.param_value
     if not (name.startswith(b"SERVO") and name.endswith(b"_FUNCTION") and number.isdigit() and math.isfinite(value)):
-        return memory
+        return
     channel = int(number)
-    if not 1 <= channel <= 32 or memory.stack is not Stack.ARDUPILOT:
-        return memory
-    watch = memory.watch
-    return memory._replace(watch=watch._replace(functions={**watch.functions, channel: int(value)}))
+    if not 1 <= channel <= 32 or memory.stack is not ARDUPILOT:
+        return
+    memory.watch.name({**memory.watch.functions, channel: int(value)})
 
 
-def esc_telemetry(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> Memory:
+def esc_telemetry(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:
     """ESC_TELEMETRY_n (ArduPilot): four motors."""
-    return _turning(memory, message, unpack("<4H", message.rpm), now)
+    _turning(memory, message, unpack("<4H", message.rpm), now)
 
 
-def esc_status(memory: Memory, message: mav.EscStatus, now: Instant, options: HardwareOptions) -> Memory:
+def esc_status(memory: Memory, message: mav.EscStatus, now: Instant, options: HardwareOptions) -> None:
     """ESC_STATUS (PX4): four motors."""
-    return _turning(memory, message, unpack("<4i", message.rpm), now)
+    _turning(memory, message, unpack("<4i", message.rpm), now)
 
 
-def _turning(memory: Memory, message: Any, rpm: tuple[int, ...], now: Instant) -> Memory:
-    before = memory.observation.esc
-    if not any(rpm):
-        over = before is not None and type(before.message) is type(message)
-        return memory._replace(observation=memory.observation._replace(esc=None)) if over else memory
-    return observed(memory, esc=heard(message, now.mono, memory.observation.esc))
+def _turning(memory: Memory, message: Any, rpm: tuple[int, ...], now: Instant) -> None:
+    seen = memory.observation
+    if any(rpm):
+        seen.esc = heard(message, now.mono, seen.esc)
+    elif seen.esc is not None and type(seen.esc.message) is type(message):
+        seen.esc = None

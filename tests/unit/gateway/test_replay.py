@@ -13,6 +13,7 @@ from mav_robot_status.gateway.plant import Plant
 from mav_robot_status.gateway.recorded import Recording
 from mav_robot_status.gateway.replay import Nobody, replay, run_through
 from mav_robot_status.hardware.robot_hw import WANTED_IDS
+from mav_robot_status.link.log import Stamped
 from mav_robot_status.mavlink.definitions import Heartbeat, MessageInterval
 from mav_robot_status.mavlink.encode import encode
 
@@ -64,10 +65,15 @@ def test_a_jump_of_the_clock_begins_anew_without_lines_in_between(tmp_path: Path
 def test_the_new_segment_knows_nothing_of_the_old_one(tmp_path: Path, stdout: TextIO) -> None:
     plant = plant_of(stdout)
     since = []
-    for _, frame in run_through(plant, Recording(log_of(tmp_path / "a.tlog", 0, 1, 90_000, 90_001))):
-        (tracked,) = plant.hw.vehicles
-        if frame is not None:
-            since.append({(inhibit.since_us - START_US) / 1e6 for inhibit in tracked.handle.detail.inhibits})
+
+    def watched() -> Iterator[Stamped]:
+        for stamped in Recording(log_of(tmp_path / "a.tlog", 0, 1, 90_000, 90_001)):
+            yield stamped
+            (tracked,) = plant.hw.vehicles
+            if stamped.what is not None:
+                since.append({(inhibit.since_us - START_US) / 1e6 for inhibit in tracked.handle.detail.inhibits})
+
+    run_through(plant, watched())
     assert since == [{0.0}, {0.0}, {90_000.0}, {90_000.0}]
 
 
@@ -82,14 +88,21 @@ def test_lines_continue_to_the_last_frame_even_if_nobody_wants_it(tmp_path: Path
     assert len(lines) == pytest.approx(61, abs=3)
 
 
-def test_each_instant_is_given_after_the_plant_has_lived_it(tmp_path: Path, stdout: TextIO) -> None:
+def test_an_instant_is_lived_before_the_next_is_asked_for(tmp_path: Path, stdout: TextIO) -> None:
     plant = plant_of(stdout)
     told = []
-    for now, frame in run_through(plant, Recording(log_of(tmp_path / "a.tlog", 0, 10))):
-        (tracked,) = plant.hw.vehicles
-        told.append((now.mono, frame is None, tracked.handle.detail.link.value, tracked.handle.heard_at))
+
+    def watched() -> Iterator[Stamped]:
+        for stamped in Recording(log_of(tmp_path / "a.tlog", 0, 10)):
+            yield stamped
+            (tracked,) = plant.hw.vehicles
+            link = tracked.handle.detail.link.value
+            told.append((stamped.now.mono, stamped.what is None, link, tracked.handle.heard_at))
+
+    last = run_through(plant, watched())
     assert told == [(0.0, False, "CONNECTED", 0.0), (10.0, False, "CONNECTED", 10.0), (10.0, True, "CONNECTED", 10.0)]
-    plant.close(now)
+    assert last.mono == 10.0
+    plant.close(last)
     stdout.seek(0)
     assert any(json.loads(line)["link"]["state"] == "LOST" for line in stdout)
 

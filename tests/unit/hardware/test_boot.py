@@ -7,8 +7,7 @@ def clocked(*samples: tuple[float, int]) -> tuple[Boot, int]:
     """The clock after (time, time_boot_ms) samples, and how many reboots they showed."""
     boot, reboots = Boot(samples[0][0]), 0
     for now, clock_ms in samples:
-        boot, anew = heard_clock(boot, clock_ms, now)
-        reboots += anew
+        reboots += heard_clock(boot, clock_ms, now)
     return boot, reboots
 
 

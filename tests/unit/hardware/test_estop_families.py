@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from mav_robot_status.clock import Instant, later
@@ -25,22 +27,30 @@ def armed(vehicle_type: int) -> Memory:
     return begin(mav.Heartbeat(0, vehicle_type, 3, 209, 4, 3), START)
 
 
+def after(memory: Memory, message: Any, seconds: float = 0.0) -> Memory:
+    hear(memory, message, later(START, seconds), OPTIONS)
+    return memory
+
+
+def after_the_command(memory: Memory) -> Memory:
+    overheard(memory, STOP, (255, 190), START)
+    return after(memory, ACCEPTED)
+
+
 def e_stopped(memory: Memory) -> TriState:
     return derive(memory, (1, 1), Detail(), later(START, 1.0), OPTIONS).status.e_stopped
 
 
 @pytest.mark.parametrize("vehicle_type", [QUADROTOR, GROUND_ROVER, FIXED_WING])
 def test_a_stop_that_is_honoured_counts(vehicle_type: int) -> None:
-    assert e_stopped(hear(armed(vehicle_type), STOPPED_BY_SWITCH, START, OPTIONS)) is TriState.TRUE
-    asked = overheard(armed(vehicle_type), STOP, (255, 190), START)
-    assert e_stopped(hear(asked, ACCEPTED, START, OPTIONS)) is TriState.TRUE
+    assert e_stopped(after(armed(vehicle_type), STOPPED_BY_SWITCH)) is TriState.TRUE
+    assert e_stopped(after_the_command(armed(vehicle_type))) is TriState.TRUE
 
 
 @pytest.mark.parametrize("vehicle_type", [SUB, BLIMP])
 def test_a_live_vehicle_that_does_not_stop_is_not_called_stopped(vehicle_type: int) -> None:
-    assert e_stopped(hear(armed(vehicle_type), STOPPED_BY_SWITCH, START, OPTIONS)) is TriState.UNKNOWN
-    asked = overheard(armed(vehicle_type), STOP, (255, 190), START)
-    assert e_stopped(hear(asked, ACCEPTED, START, OPTIONS)) is TriState.UNKNOWN
+    assert e_stopped(after(armed(vehicle_type), STOPPED_BY_SWITCH)) is TriState.UNKNOWN
+    assert e_stopped(after_the_command(armed(vehicle_type))) is TriState.UNKNOWN
 
 
 def telemetry(rpm: int) -> mav.EscTelemetry1To4:
@@ -48,18 +58,18 @@ def telemetry(rpm: int) -> mav.EscTelemetry1To4:
 
 
 def test_a_motor_that_no_longer_turns_is_no_evidence() -> None:
-    turning = hear(armed(QUADROTOR), telemetry(4000), START, OPTIONS)
+    turning = after(armed(QUADROTOR), telemetry(4000))
     assert e_stopped(turning) is TriState.FALSE
-    assert e_stopped(hear(turning, telemetry(0), later(START, 0.5), OPTIONS)) is TriState.UNKNOWN
+    assert e_stopped(after(turning, telemetry(0), 0.5)) is TriState.UNKNOWN
 
 
 def test_a_propeller_that_the_wind_may_turn_is_no_evidence() -> None:
-    assert e_stopped(hear(armed(FIXED_WING), telemetry(4000), START, OPTIONS)) is TriState.UNKNOWN
+    assert e_stopped(after(armed(FIXED_WING), telemetry(4000))) is TriState.UNKNOWN
 
 
 @pytest.mark.parametrize(("throttle_us", "expected"), [(1500, TriState.UNKNOWN), (1650, TriState.FALSE)])
 def test_motors_that_turn_while_their_outputs_are_at_stop_may_only_coast(throttle_us: int, expected: TriState) -> None:
-    rover = hear(armed(GROUND_ROVER), telemetry(900), START, OPTIONS)
+    rover = after(armed(GROUND_ROVER), telemetry(900))
     values = (0,) * 2 + (throttle_us,) + (0,) * 13
-    watch = outputs.Watch(stop={3: 1500}, driven=throttle_us != 1500, at=START.mono, values=values)
-    assert e_stopped(rover._replace(watch=watch)) is expected
+    rover.watch = outputs.Watch(stop={3: 1500}, driven=throttle_us != 1500, at=START.mono, values=values)
+    assert e_stopped(rover) is expected

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections import deque
+
 import pytest
 
 from mav_robot_status.hardware.observation import Heard, heard, interval, is_fresh
@@ -48,4 +50,4 @@ def test_the_interval_is_the_median_of_the_last_five(times: tuple[float, ...], e
 
 
 def test_only_the_last_arrivals_are_remembered() -> None:
-    assert arrivals(*range(20)).times == (14, 15, 16, 17, 18, 19)
+    assert arrivals(*range(20)).times == deque((14, 15, 16, 17, 18, 19))

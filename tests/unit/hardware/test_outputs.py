@@ -4,7 +4,7 @@ import pytest
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.hardware.identity import family_of
-from mav_robot_status.hardware.outputs import NOT_WATCHED, Watch, channels, heard_beat, heard_outputs, verdict
+from mav_robot_status.hardware.outputs import Watch, channels, heard_beat, heard_outputs, verdict
 from mav_robot_status.hardware.pulse import Pulse, first_beat, next_beat
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink.definitions import Heartbeat
@@ -28,14 +28,14 @@ class Machine:
         heartbeat = Heartbeat(0, self.type, 3, 0x81 if armed else 1, 4, 3)
         after = next_beat(before, heartbeat, self.now, True) if before else first_beat(heartbeat, self.now)
         self.pulse = after
-        self.watch = heard_beat(self.watch, after, before, enabled, self.type, self.now.mono)
+        heard_beat(self.watch, after, before, enabled, self.type, self.now.mono)
         return self
 
     def put(self, values: tuple[int, ...], throttle: float | None = 50, speed: float = 0.0) -> Machine:
         self.now = later(self.now, 0.5)
         assert self.pulse is not None
         padded = (*values, *(0,) * 16)[:16]
-        self.watch = heard_outputs(self.watch, padded, self.type, self.pulse, throttle, speed, self.now.mono)
+        heard_outputs(self.watch, padded, self.type, self.pulse, throttle, speed, self.now.mono)
         return self
 
     def learn(self, values: tuple[int, ...] = STOP) -> Machine:
@@ -122,9 +122,9 @@ def test_disarming_ends_what_the_outputs_said() -> None:
 
 
 def test_channels_come_from_the_parameters_and_else_from_the_type() -> None:
-    assert channels(NOT_WATCHED, QUAD) == ((1, 2, 3, 4), True)
-    assert channels(NOT_WATCHED, ROVER) == ((3,), True)
-    assert channels(NOT_WATCHED, PLANE) == ((), True)
+    assert channels(Watch(), QUAD) == ((1, 2, 3, 4), True)
+    assert channels(Watch(), ROVER) == ((3,), True)
+    assert channels(Watch(), PLANE) == ((), True)
     skid = Watch(functions={1: 73, 2: 0, 3: 74})
     assert channels(skid, ROVER) == ((1, 3), False)
     assert channels(Watch(functions={1: 33, 8: 31}), HELI) == ((8,), False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import string
 from collections.abc import Callable
 from functools import partial
@@ -180,7 +181,7 @@ def test_a_status_is_changed_by_messages_and_time_only(
     walk = Walk(options)
     for seconds, message in flight:
         walk.take(message, seconds)
-        before = walk.status, walk.detail, walk.memory
+        before = walk.status, walk.detail, copy.deepcopy(walk.memory)
         walk.hw.read(walk.now)
         assert (walk.status, walk.detail, walk.memory) == before
         once, twice = (derive(walk.memory, (1, 1), walk.detail, walk.now, options) for _ in range(2))

@@ -29,40 +29,37 @@ def memory_of(inputs: dict[str, Any]) -> tuple[Memory, Instant]:
     vehicle_type, autopilot, base_mode, custom_mode, state = inputs["hb"]
     heartbeat = mav.Heartbeat(custom_mode, vehicle_type, autopilot, base_mode, state, 3)
     before = Instant(NOW.mono - 0.5, NOW.unix_us - 500_000)
-    memory = begin(heartbeat, before)._replace(boot=Boot(NOW.mono - UPTIME_MS / 1000))
+    memory = begin(heartbeat, before)
+    memory.boot = Boot(NOW.mono - UPTIME_MS / 1000)
     if "ss" in inputs:
         words = [*inputs["ss"], 0, 0, 0][:6]
         errors = inputs.get("ierr", 0)
         counters = (0, 0, 0, 0, 0, errors & 0xFFFF, errors >> 16, 0, 0, 0)
         status = mav.SysStatus._make((*words[:3], *counters, *words[3:]))
-        memory = hear(memory, status, before, OPTIONS)
-        faults = {bit: f._replace(messages=sensors.DEBOUNCE_MESSAGES) for bit, f in memory.faults.items()}
+        hear(memory, status, before, OPTIONS)
+        memory.faults = {bit: f._replace(messages=sensors.DEBOUNCE_MESSAGES) for bit, f in memory.faults.items()}
         ready = estop.READY_MESSAGES if _would_be_ready(memory, status) else 0
-        memory = memory._replace(faults=faults, stop=memory.stop._replace(ready=ready))
+        memory.stop = memory.stop._replace(ready=ready)
     if "landed" in inputs:
-        memory = hear(memory, mav.ExtendedSysState(0, inputs["landed"]), before, OPTIONS)
+        hear(memory, mav.ExtendedSysState(0, inputs["landed"]), before, OPTIONS)
     if "rate" in inputs:
-        memory = hear(memory, mav.Attitude(UPTIME_MS, 0, 0, 0, 0, 0, inputs["rate"]), before, OPTIONS)
+        hear(memory, mav.Attitude(UPTIME_MS, 0, 0, 0, 0, 0, inputs["rate"]), before, OPTIONS)
     if "vel" in inputs:
-        memory = hear(memory, mav.LocalPositionNed(UPTIME_MS, 0, 0, 0, *inputs["vel"]), before, OPTIONS)
+        hear(memory, mav.LocalPositionNed(UPTIME_MS, 0, 0, 0, *inputs["vel"]), before, OPTIONS)
         sustained = NOW.mono - motion.SUSTAIN_OFF
         measured = memory.motion
-        memory = memory._replace(
-            motion=measured._replace(
-                fast_since=None if measured.fast_since is None else sustained,
-                slow_since=None if measured.slow_since is None else sustained,
-            )
-        )
+        measured.fast_since = None if measured.fast_since is None else sustained
+        measured.slow_since = None if measured.slow_since is None else sustained
     if "std" in inputs:
-        memory = hear(memory, mav.CurrentMode(custom_mode, custom_mode, inputs["std"]), before, OPTIONS)
+        hear(memory, mav.CurrentMode(custom_mode, custom_mode, inputs["std"]), before, OPTIONS)
     for code in inputs.get("texts", ()):
-        memory = memory._replace(latches=causes.announce(memory.latches, code, "as announced", before))
+        memory.latches = causes.announce(memory.latches, code, "as announced", before)
     if "estop" in inputs:
         said = TriState(inputs["estop"])
         text = "RC7: MotorEStop HIGH" if said else "RC7: MotorEStop LOW"
-        memory = memory._replace(stop=estop.said(memory.stop, bool(said), text, before))
+        memory.stop = estop.said(memory.stop, bool(said), text, before)
     if "driven" in inputs:
-        memory = memory._replace(watch=_watch(TriState(inputs["driven"]), before))
+        memory.watch = _watch(TriState(inputs["driven"]), before)
     later = Instant(NOW.mono + 10, NOW.unix_us + 10_000_000) if inputs.get("stale") else NOW
     return memory, later
 

@@ -115,6 +115,7 @@ class Live:
             steps.callback(self._wake_read.close)
             steps.callback(self._wake_write.close)
             steps.callback(self.switchboard.close)
+            steps.callback(self._tell_losses)
             steps.callback(self.plant.close, self._clock())
 
     def _gather(self, due: float) -> None:
@@ -144,6 +145,11 @@ class Live:
     def _next_due(self, now: float) -> float:
         due = min(self.plant.next_due(now, now + LONGEST_WAIT), self._told_at, self.switchboard.next_due())
         return min(due, self._beat_at + HEARTBEAT_PERIOD) if self._config.identity.heartbeat else due
+
+    def _tell_losses(self) -> None:
+        for tracked in self.plant.hw.vehicles:
+            if tracked.losses and tracked.ids is not None:
+                log.info("vehicle %d.%d was lost %d times", *tracked.ids, tracked.losses)
 
     def _tell_silence(self, now: Instant) -> None:
         if any(self.plant.hw.vehicles):

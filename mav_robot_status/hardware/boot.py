@@ -24,6 +24,10 @@ class Boot:
     clock_ms: int | None = None
     doubt_ms: int | None = None
     """A sample that lies back and waits to be confirmed."""
+    shown: float | None = None
+    """The boot that the last step back has shown, monotonic seconds."""
+    in_turn: bool = False
+    """Whether that boot was shown before, and the clock has told another one since: two autopilots take turns."""
 
 
 def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> bool:
@@ -42,7 +46,8 @@ def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> bool:
     if boot.doubt_ms is None or _difference(time_boot_ms, boot.doubt_ms) < 0:
         boot.doubt_ms = time_boot_ms
         return False
-    boot.at, boot.clock_ms, boot.doubt_ms = booted, time_boot_ms, None
+    boot.in_turn = boot.shown is not None and abs(booted - boot.shown) < STEP_BACK_MS / 1000
+    boot.at, boot.clock_ms, boot.doubt_ms, boot.shown = booted, time_boot_ms, None, booted
     return True
 
 

@@ -75,6 +75,7 @@ class Tracked:
         "dirty",
         "handle",
         "ids",
+        "losses",
         "memory",
         "parameters",
         "requests",
@@ -91,6 +92,8 @@ class Tracked:
         self.requests: Requests | None = None
         self.parameters: Parameters | None = None
         self.boots = 0
+        self.losses = 0
+        """How often the link was lost."""
         self.seen: Matters = {}
         """What mattered at the last look."""
         self.dirty = False
@@ -371,6 +374,7 @@ class MavlinkRobotHW(RobotHW):
         self._ask_anew = True
         ids = tracked.ids or (0, 0)
         if state is LinkState.LOST and before is LinkState.CONNECTED:
+            tracked.losses += 1
             log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, self.options.heartbeat_timeout)
         elif state is LinkState.CONNECTED and before is LinkState.LOST:
             log.info("vehicle %d.%d is back", *ids)

@@ -96,7 +96,9 @@ def rebooted(memory: Memory, boot: boot_rules.Boot, now: Instant) -> None:
         boots=memory.boots + 1,
         formerly=memory.formerly,
     )
-    if 5004 in memory.latches or armed_before(memory.pulse, boot.at, LONG_LOSS):
+    if boot.in_turn:
+        new.latches = causes.announce(new.latches, 9002, None, now, "time_boot_ms of two clocks in turn")
+    elif 5004 in memory.latches or armed_before(memory.pulse, boot.at, LONG_LOSS):
         new.latches = causes.announce(new.latches, 5004, None, now, "time_boot_ms")
     memory.become(new)
 

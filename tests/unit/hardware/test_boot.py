@@ -8,6 +8,7 @@ def clocked(*samples: tuple[float, int]) -> tuple[Boot, int]:
     boot, reboots = Boot(samples[0][0]), 0
     for now, clock_ms in samples:
         reboots += heard_clock(boot, clock_ms, now)
+    boot.shown, boot.in_turn = None, False  # tested below
     return boot, reboots
 
 
@@ -48,3 +49,19 @@ def test_a_clock_that_wraps_is_no_reboot() -> None:
 
 def test_a_second_reboot_is_noticed_too() -> None:
     assert clocked((0.0, 900_000), (1.0, 0), (2.0, 1000), (9.0, 8000), (10.0, 500), (11.0, 1500))[1] == 2
+
+
+def test_a_boot_that_is_shown_again_after_another_clock_has_spoken_is_of_two_autopilots() -> None:
+    boot = Boot(0.0)
+    turns = [(1000.0, 900_000), (1000.1, 10_000), (1000.2, 10_100), (1000.3, 900_300), (1000.4, 10_300)]
+    assert [heard_clock(boot, clock, at) for at, clock in turns] == [False, False, True, False, False]
+    assert not boot.in_turn
+    assert heard_clock(boot, 10_400, 1000.5)
+    assert boot.in_turn
+
+
+def test_a_second_reboot_is_of_another_boot() -> None:
+    boot = Boot(0.0)
+    for at, clock in ((0.0, 900_000), (1.0, 0), (2.0, 1000), (9.0, 8000), (10.0, 500), (11.0, 1500)):
+        heard_clock(boot, clock, at)
+    assert not boot.in_turn

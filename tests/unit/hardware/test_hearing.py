@@ -90,6 +90,17 @@ def test_two_autopilots_that_take_turns_with_the_same_ids_are_a_conflict_until_o
     assert flight.codes == []
 
 
+def test_two_clocks_that_come_in_turn_from_one_router_are_a_conflict_and_no_reboots_while_armed() -> None:
+    flight = copter().set(armed=True)
+    for name, uptime in (("attitude", 900_000), ("attitude of the other", 0)):
+        flight.stream(name, lambda more=uptime: mav.Attitude(flight.boot_ms + more, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), hz=2)
+    doubled = flight.stream("system_time of the other", flight.system_time, hz=2)
+    doubled.wait(5)
+    assert flight.codes == [9002]
+    doubled.stop("attitude of the other", "system_time of the other").wait(12)
+    assert 9002 not in flight.codes
+
+
 @pytest.mark.parametrize(("autopilot", "state", "reboots"), [(3, 1, 1), (3, 0, 1), (PX4, 0, 0), (3, 2, 0), (0, 0, 1)])
 def test_a_state_of_starting_after_standby_is_a_reboot_but_not_uninit_of_px4(
     autopilot: int, state: int, reboots: int

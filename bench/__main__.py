@@ -1,0 +1,104 @@
+"""`python -m bench`: measure, and say beside each number what others need on the same machine in the same run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from contextlib import closing
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from .case import Bench, Case
+from .cases import forward, latency, memory, parse, replay, saturate, signed, start, udp, vehicles
+from .contenders import MAVPROXY, MAVSDK, ROUTER, Contenders
+from .machine import machine, versions
+from .process import BenchError
+from .report import render
+from .results import OURS, Sample, Skip, collect
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+CASES: Final[dict[str, Case]] = {
+    module.CASE.name: module.CASE
+    for module in (parse, replay, udp, saturate, forward, latency, memory, start, vehicles, signed)
+}
+"""In the order in which they are measured."""
+ROUNDS: Final = 3
+PLACES: Final = {MAVPROXY: "MAVPROXY", MAVSDK: "MAVSDK_PYTHON", ROUTER: "MAVLINK_ROUTERD"}
+"""Peer -> environment variable with its path."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    made = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    made.add_argument("--only", action="append", choices=CASES, metavar="CASE", help=f"one of {', '.join(CASES)}")
+    made.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help=f"rounds; medians are shown ({ROUNDS})")
+    made.add_argument("--quick", action="store_true", help="a quarter of the time for everything")
+    made.add_argument("--long", action="store_true", help="memory: ten million frames")
+    made.add_argument("--log", type=Path, metavar="FILE", help="replay this recorded log too")
+    made.add_argument("--out", type=Path, metavar="DIR", help="write results.json and results.md there")
+    made.add_argument("--list", action="store_true", help="say what would be measured, and stop")
+    for peer, variable in PLACES.items():
+        option = "--mavsdk-python" if peer == MAVSDK else f"--{peer.lower()}"
+        made.add_argument(option, dest=variable, default=os.environ.get(variable), metavar="PATH",
+                          help=f"where {peer} is, if it is not found by itself; or ${variable}")  # fmt: skip
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure what was asked for."""
+    options = parser().parse_args(arguments)
+    cases = [CASES[name] for name in CASES if not options.only or name in options.only]
+    if options.list:
+        print("\n".join(f"{case.name:<10}{case.title}" for case in cases))
+        return 0
+    paths = {peer: getattr(options, variable) for peer, variable in PLACES.items() if getattr(options, variable)}
+    with tempfile.TemporaryDirectory() as place, closing(Contenders(Path(place), paths)) as contenders:
+        bench = Bench(Path(place), contenders, options.quick, options.long, options.log)
+        result = {
+            "date": f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC",
+            "machine": machine(),
+            "versions": versions() | contenders.versions(),
+            "rounds": options.rounds,
+            "quick": options.quick,
+            "cases": _run(bench, cases, options.rounds),
+        }
+    text = render(result)
+    if options.out:
+        options.out.mkdir(parents=True, exist_ok=True)
+        (options.out / "results.json").write_text(json.dumps(result, indent=1) + "\n")
+        (options.out / "results.md").write_text(text)
+    print(text, end="")
+    return 0
+
+
+def _run(bench: Bench, cases: list[Case], rounds: int) -> list[dict[str, Any]]:
+    """Every case once a round, so that a machine that is busy for a while spoils no case altogether."""
+    found: dict[str, list[list[Sample | Skip]]] = {case.name: [] for case in cases}
+    for number in range(1, rounds + 1):
+        for case in cases:
+            start = time.monotonic()
+            found[case.name].append(_round(bench, case))
+            took = time.monotonic() - start
+            print(f"round {number} of {rounds}: {case.name}, {took:.0f} s", file=sys.stderr, flush=True)
+    return [collect(case.name, case.title, found[case.name], case.targets) for case in cases]
+
+
+def _round(bench: Bench, case: Case) -> list[Sample | Skip]:
+    found: list[Sample | Skip] = []
+    try:
+        for item in case.measure(bench):
+            found.append(item)  # one by one: what was measured before an error is kept
+    except (BenchError, OSError) as error:  # a process has ended; the other cases are still worth having
+        found.append(Skip(case.title, OURS, str(error)))
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""Forwarding from one UDP port to another, beside the status."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+from collections.abc import Iterator
+
+from ..case import Bench, Case, Found
+from ..contenders import MAVPROXY, ROUTER, Missing
+from ..feed import Feed
+from ..process import BenchError, free_port, queue
+from ..results import OURS, PYMAVLINK, Sample, Skip, Target
+
+RATES = (8000, 40_000)
+EVERYONE = (OURS, PYMAVLINK, ROUTER, MAVPROXY)
+WHOLE, ADDED = "CPU per frame, us", "CPU per frame that forwarding adds, us"
+DELIVERED = "delivered, %"
+SECONDS = 4.0
+
+
+def measure(bench: Bench) -> Found:
+    """One round."""
+    skipped: list[Skip] = []
+    if bench.contenders.has_option("--forward"):
+        alone = dict(_alone(bench))
+    for who in bench.contenders.each(EVERYONE, skipped):
+        port = free_port()
+        try:
+            with (
+                _Sink() as sink,
+                bench.contenders.start_forwarding(who, port, sink.port) as child,
+                Feed(bench.frames(), port) as feed,
+            ):
+                child.listens(port)
+                feed.warm_up()
+                sink.delivered()
+                for rate in RATES:
+                    fed = feed.measure(child, rate, bench.lasting(SECONDS))
+                    setup = f"{rate} frames/s"
+                    yield Sample(setup, WHOLE, who, fed.per_frame, fed.note)
+                    yield Sample(setup, DELIVERED, who, 100 * sink.delivered() / fed.sent)
+                    added = fed.per_frame - alone[rate] if who == OURS else fed.per_frame
+                    if who in (OURS, ROUTER):
+                        yield Sample(setup, ADDED, who, added)
+        except (BenchError, Missing) as error:
+            skipped.append(Skip("", who, str(error)))
+    yield from skipped
+
+
+def _alone(bench: Bench) -> Iterator[tuple[int, float]]:
+    """What our status costs without forwarding."""
+    port = free_port()
+    with bench.contenders.start_ours(port, "--json", "none") as child, Feed(bench.frames(), port) as feed:
+        child.listens(port)
+        feed.warm_up()
+        for rate in RATES:
+            yield rate, feed.measure(child, rate, bench.lasting(SECONDS)).per_frame
+
+
+class _Sink:
+    """Where frames are forwarded to. Nobody reads it: what arrives is counted from its queue and the kernel's drops."""
+
+    def __init__(self) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", 0))
+        self._socket.setblocking(False)
+        self.port = int(self._socket.getsockname()[1])
+        self._dropped = 0
+
+    def __enter__(self) -> _Sink:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+    def delivered(self) -> int:
+        """Datagrams since the last call."""
+        found = queue(self.port)
+        dropped = found.dropped if found else 0
+        number, self._dropped = dropped - self._dropped, dropped
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                self._socket.recv(2048)
+                number += 1
+        return number
+
+
+CASE = Case(
+    "forward",
+    "Forwarding",
+    measure,
+    tuple(
+        Target(
+            f"{rate} frames/s", ADDED,
+            f"forwarding at {rate} frames/s: adds at most 1.5 times mavlink-routerd's CPU", 1.5, peer=ROUTER,
+        )
+        for rate in RATES
+    ),
+)  # fmt: skip

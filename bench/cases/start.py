@@ -1,0 +1,67 @@
+"""From the start of the process to its first JSON line, with a heartbeat waiting all the time."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from ..case import Bench, Case, Found
+from ..process import BenchError, free_port
+from ..results import OURS, PYMAVLINK, Sample, Target
+
+SETUP = "start to first JSON line"
+WALL, CPU = "time, ms", "CPU, ms"
+EVERY = 0.005  # s between heartbeats
+
+
+def measure(bench: Bench) -> Found:
+    """One round."""
+    starts = {OURS: bench.contenders.start_ours, PYMAVLINK: bench.contenders.start_pymavlink}
+    for who, start in starts.items():
+        port = free_port()
+        with _Beats(port):
+            began = time.perf_counter()
+            with start(port, pipe=True) as child:
+                assert child.process.stdout is not None
+                if not child.process.stdout.readline():
+                    raise BenchError(f"{who} ended without a line: {child.stop()}")
+                took = time.perf_counter() - began
+                yield Sample(SETUP, WALL, who, took * 1000)
+                yield Sample(SETUP, CPU, who, child.cpu() * 1000)
+
+
+class _Beats:
+    """Heartbeats to a port, from a thread."""
+
+    def __init__(self, port: int) -> None:
+        self._port = port
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> None:
+        self._thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            out.connect(("127.0.0.1", self._port))
+            while not self._stop.wait(EVERY):
+                with contextlib.suppress(OSError):  # nobody is there yet
+                    out.send(dialect.MAVLink_heartbeat_message(10, 3, 81, 0, 3, 3).pack(mav))
+                    mav.seq = (mav.seq + 1) & 255
+
+
+CASE = Case(
+    "start",
+    "Start",
+    measure,
+    (Target(SETUP, WALL, "start to first line: below 200 ms", 200.0),),
+)

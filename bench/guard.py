@@ -1,0 +1,211 @@
+"""A guard against slower code that looks at no clock: bytecode instructions, counted, against committed numbers.
+
+`python -m bench.guard` compares, `--update` writes the numbers of this Python anew. An instruction counts wherever it
+runs, in the standard library too, so that work which only moves is still seen; the inside of C code is not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import socket
+import sys
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from mav_robot_status.clock import Instant, later
+from mav_robot_status.config import Config, LinkConfig
+from mav_robot_status.gateway.live import Live
+from mav_robot_status.hardware.robot_hw import WANTED_IDS, MavlinkRobotHW
+from mav_robot_status.mavlink.framing import Parser
+
+from . import workload
+from .instructions import count
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+BASELINE: Final = Path(__file__).with_name("baseline.json")
+TOLERANCE: Final = 0.05
+"""How much more is still the same: patch releases of Python compile a little differently."""
+THIS_PYTHON: Final = f"{sys.version_info.major}.{sys.version_info.minor}"
+START: Final = Instant(1000.0, 1_800_000_000_000_000)
+FRAMES: Final = 1600
+TURNS: Final = 20
+
+
+class Verdict(NamedTuple):
+    """One number against its baseline: what is new has 0, and so has to be put into the baseline."""
+
+    name: str
+    counted: float
+    baseline: float
+
+    @property
+    def worse(self) -> bool:
+        """Whether it is more than the tolerance allows."""
+        return self.counted > self.baseline * (1 + TOLERANCE)
+
+    def __str__(self) -> str:
+        stale = self.counted < self.baseline * (1 - TOLERANCE)
+        mark = "MORE" if self.worse else "less, see --update" if stale else "the same"
+        return f"{self.name:<48}{self.counted:>10.1f}{self.baseline:>10.1f}  {mark}"
+
+
+# what is counted: each gives what to run, and how many of its unit that is
+
+Work = tuple["Callable[[], object]", int]
+
+
+@contextmanager
+def parse_stream() -> Iterator[Work]:
+    """Parsing a stream that is read in pieces."""
+    pieces = workload.chunks(workload.frames(FRAMES))
+    parser = Parser(WANTED_IDS)
+    yield lambda: [parser.feed(piece) for piece in pieces], FRAMES
+
+
+@contextmanager
+def parse_datagrams() -> Iterator[Work]:
+    """Parsing one frame at a time."""
+    pieces = workload.frames(FRAMES)
+    parser = Parser(WANTED_IDS)
+    yield lambda: [parser.feed(piece) for piece in pieces], FRAMES
+
+
+@contextmanager
+def take() -> Iterator[Work]:
+    """Taking the frames that a status needs."""
+    frames = Parser(WANTED_IDS).feed(b"".join(workload.frames(FRAMES)))
+    hw = MavlinkRobotHW()
+    yield lambda: [hw.take(frame, later(START, i / 9.2)) for i, frame in enumerate(frames)], len(frames)
+
+
+@contextmanager
+def wake_ups() -> Iterator[Work]:
+    """Turns of the live loop, each with one datagram, at 8000 a second."""
+    sent = 0
+    with _live(lambda: later(START, sent / 8000)) as (live, send):
+        left = iter(workload.frames(FRAMES))
+
+        def until() -> bool:
+            nonlocal sent
+            piece = next(left, None)
+            if piece is not None:
+                send(piece)
+                sent += 1
+            return piece is None
+
+        yield lambda: live.run(until), FRAMES
+
+
+@contextmanager
+def idle_turns() -> Iterator[Work]:
+    """Turns in which there is nothing to do."""
+    with _hearing() as (live, now):
+        yield lambda: _turns(live, now, 1e-6), TURNS
+
+
+@contextmanager
+def publications() -> Iterator[Work]:
+    """Turns in which a JSON line is due, and now and then a heartbeat of ours and ROBOT_STATUS."""
+    with _hearing() as (live, now):
+        yield lambda: _turns(live, now, 0.101), TURNS
+
+
+COUNTED: Final[dict[str, Callable[[], AbstractContextManager[Work]]]] = {
+    "Parser.feed, 1400 bytes: per frame": parse_stream,
+    "Parser.feed, a datagram: per frame": parse_datagrams,
+    "MavlinkRobotHW.take: per frame that is needed": take,
+    "Live.run: per turn with a datagram": wake_ups,
+    "Live.turn: nothing to do": idle_turns,
+    "Live.turn: statuses at 10 Hz": publications,
+}
+
+
+@contextmanager
+def _live(clock: Callable[[], Instant]) -> Iterator[tuple[Live, Callable[[bytes], object]]]:
+    """A gateway with a clock of our own, and how to send it a datagram."""
+    with open(os.devnull, "w") as nowhere, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        live = Live(Config(links=(LinkConfig("udpin:127.0.0.1:0"),)), nowhere, clock)
+        try:
+            link: Any = live.stations[0].link
+            out.connect(("127.0.0.1", link.port))
+            yield live, out.send
+        finally:
+            live.close()
+
+
+@contextmanager
+def _hearing() -> Iterator[tuple[Live, Instant]]:
+    """A gateway with a vehicle whose messages of some seconds it has heard, and the time now."""
+    with _live(lambda: START) as (live, _):
+        for i, frame in enumerate(Parser(WANTED_IDS).feed(b"".join(workload.frames(FRAMES)))):
+            now = later(START, i / 9.2)
+            live.plant.take(frame, now)
+        live.turn(now)
+        yield live, now
+
+
+def _turns(live: Live, now: Instant, step: float) -> None:
+    for i in range(TURNS):
+        live.turn(later(now, (i + 1) * step))
+
+
+# counting
+
+
+def measure() -> dict[str, float]:
+    """Every number of this Python."""
+    logging.disable(logging.CRITICAL)
+    try:
+        return {name: round(_per_unit(make), 1) for name, make in COUNTED.items()}
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+def _per_unit(make: Callable[[], AbstractContextManager[Work]]) -> float:
+    with make() as (run, _):  # once for the caches
+        run()
+    with make() as (run, units):
+        return count(run, without=__file__) / units
+
+
+# comparing
+
+
+def baselines() -> dict[str, dict[str, float]]:
+    """The committed numbers, by Python."""
+    found: dict[str, dict[str, float]] = json.loads(BASELINE.read_text()) if BASELINE.exists() else {}
+    return found
+
+
+def compare(counted: dict[str, float], baseline: dict[str, float]) -> list[Verdict]:
+    """Each number beside its baseline."""
+    return [Verdict(name, value, baseline.get(name, 0.0)) for name, value in counted.items()]
+
+
+def main() -> int:
+    """0: nothing needs more than it did; 1: something does."""
+    parser = argparse.ArgumentParser(prog="python -m bench.guard", description=__doc__)
+    parser.add_argument("--update", action="store_true", help="write the numbers of this Python as the baseline")
+    options = parser.parse_args()
+    committed = baselines()
+    counted = measure()
+    if options.update:
+        committed[THIS_PYTHON] = counted
+        BASELINE.write_text(json.dumps(dict(sorted(committed.items())), indent=2) + "\n")
+    if THIS_PYTHON not in committed:
+        print(f"there is no baseline for Python {THIS_PYTHON}; --update writes one")
+        return 0
+    verdicts = compare(counted, committed[THIS_PYTHON])
+    print(f"{'instructions, Python ' + THIS_PYTHON:<48}{'now':>10}{'baseline':>10}")
+    print("\n".join(map(str, verdicts)))
+    return int(any(verdict.worse for verdict in verdicts))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,114 @@
+"""Child processes and what the kernel knows of them: CPU time, memory, the queue of a UDP socket."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+ROOT = Path(__file__).parents[1]
+PATIENCE = 20.0  # s for a process to start or to end
+
+
+class BenchError(Exception):
+    """Something that is measured does not do what it should."""
+
+
+class Child:
+    """A process that is measured. As a context manager it is ended for sure."""
+
+    def __init__(self, command: Sequence[str], *, pipe: bool = False, env: dict[str, str] | None = None) -> None:
+        """Start it. `pipe`: its standard output is read here, else nobody's."""
+        self._log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  # closed with the child
+        self.process: subprocess.Popen[bytes] = subprocess.Popen(
+            list(command),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE if pipe else subprocess.DEVNULL,
+            stderr=self._log,
+            cwd=ROOT,
+            env=env,
+        )
+
+    def __enter__(self) -> Child:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.stop()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
+        self._log.close()
+
+    def cpu(self) -> float:
+        """Seconds of CPU time of all its threads so far, exact to nanoseconds: its CPU-time clock."""
+        return time.clock_gettime((~self.process.pid << 3) | 2)
+
+    def memory(self) -> float:
+        """Resident memory in MB."""
+        found = re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{self.process.pid}/status").read_text())
+        return int(found[1]) / 1024 if found else 0.0
+
+    def stop(self) -> str:
+        """End it; what it wrote to standard error."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.process.wait(PATIENCE)
+            self.process.kill()
+            self.process.wait()
+        self._log.seek(0)
+        return self._log.read().decode("utf-8", "replace")
+
+    def listens(self, port: int) -> None:
+        """Wait until it has the UDP port. Raises BenchError if that does not happen."""
+        deadline = time.monotonic() + PATIENCE
+        while queue(port) is None:
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                raise BenchError(f"does not listen on port {port}: {self.stop()[-300:].strip()}")
+            time.sleep(0.01)
+
+
+class Queue(NamedTuple):
+    """The receiving side of a UDP socket."""
+
+    waiting: int
+    """Bytes that were not read yet."""
+    dropped: int
+    """Datagrams that found no room, since the socket was opened."""
+
+
+def queue(port: int) -> Queue | None:
+    """Of the socket bound to this port; None if there is none."""
+    for table in ("/proc/net/udp", "/proc/net/udp6"):
+        with contextlib.suppress(OSError):
+            for line in Path(table).read_text().splitlines()[1:]:
+                cells = line.split()
+                if int(cells[1].rpartition(":")[2], 16) == port:
+                    return Queue(int(cells[4].partition(":")[2], 16), int(cells[-1]))
+    return None
+
+
+def drained(port: int, patience: float = 2.0) -> bool:
+    """Wait until everything that was sent to a port is read; False if that takes too long."""
+    deadline = time.monotonic() + patience
+    while time.monotonic() < deadline:
+        found = queue(port)
+        if found is None or not found.waiting:
+            return True
+        time.sleep(0.002)
+    return False
+
+
+def free_port() -> int:
+    """A UDP port that nobody has."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_port:
+        any_port.bind(("127.0.0.1", 0))
+        return int(any_port.getsockname()[1])

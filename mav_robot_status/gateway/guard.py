@@ -63,7 +63,22 @@ class GuardedPublisher:
         """Hand on."""
         return self._guard.call(None, self._publisher.service, now)
 
+    @property
+    def queued(self) -> int:
+        """What the publisher holds, if it tells."""
+        return _number(self._publisher, "queued")
+
+    @property
+    def dropped(self) -> int:
+        """What the publisher had no room for, if it tells."""
+        return _number(self._publisher, "dropped")
+
     def close(self) -> None:
         """Hand on, also to a broken one: it may hold something."""
         self._guard.broken = False
         self._guard.call(None, self._publisher.close)
+
+
+def _number(publisher: Publisher, name: str) -> int:
+    value = getattr(publisher, name, 0)  # a third party may call something else so
+    return value if isinstance(value, int) else 0

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
 from ..mavlink.commands import ROBOT_STATUS
+from .metrics import metrics
 from .plant import Plant
 from .switchboard import Switchboard
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config
+    from ..interface import Metrics
     from .station import Station
 
 log = logging.getLogger(__name__)
@@ -28,6 +30,8 @@ log = logging.getLogger(__name__)
 HEARTBEAT_PERIOD: Final = 1.0  # s
 FIRST_SILENCE, LATER_SILENCE = 3.5, 30.0  # s until the log says that no autopilot is heard, and again
 LONGEST_WAIT: Final = 1.0  # s
+MOST_AT_ONCE, MOST_GATHERED = 64, 1024
+"""Datagrams read before anything else is done: all that may have gathered, but a flood must not stop the rest."""
 
 
 class Live:
@@ -38,13 +42,14 @@ class Live:
         self._clock = clock
         self._config = config
         self._asks = config.requests == "missing" and not all(link.passive for link in config.links)
+        self._at_once = MOST_GATHERED if config.coalesce else MOST_AT_ONCE
         self._beat_at = self._told_at = -math.inf
         self._stop = False
         self._handlers: dict[int, Any] = {}
         with ExitStack() as opened:  # what fails half-way leaves nothing open
             self.switchboard = Switchboard(config, clock)
             opened.callback(self.switchboard.close)
-            self.plant = Plant(config, self.switchboard, stdout)
+            self.plant = Plant(config, self.switchboard, stdout, metrics=self.metrics)
             self.plant.hw.own_system = config.identity.system
             if self.plant.publishes("mavlink"):
                 self.switchboard.offered |= {ROBOT_STATUS}
@@ -57,6 +62,10 @@ class Live:
     def stations(self) -> list[Station]:
         """The links, vehicles' first."""
         return self.switchboard.stations
+
+    def metrics(self, now: Instant) -> Metrics:
+        """What is so and was counted up to `now`."""
+        return metrics(self.plant, self.switchboard, now)
 
     def stop(self) -> None:
         """Make `run` return soon; may be called from a signal handler or another thread."""
@@ -78,11 +87,14 @@ class Live:
         self._told_at = now.mono + FIRST_SILENCE
         poll = select.poll()
         poll.register(self._wake_read, select.POLLIN)
+        due = -math.inf
         try:
             while not (self._stop or until()):
-                self.switchboard.watch(poll)
-                self.turn(now)
-                due = min(self._next_due(now.mono), now.mono + LONGEST_WAIT)
+                if self._is_stirred() or now.mono >= due:  # most of what comes changes nothing, and costs no turn
+                    self.switchboard.watch(poll)
+                    self.turn(now)
+                    due = min(self._next_due(now.mono), now.mono + LONGEST_WAIT)
+                due = min(due, self.plant.hw.deadline)
                 wait = due - self._clock().mono
                 # rounded up to milliseconds: rounded down, the loop would spin until the moment has come
                 events = poll.poll(math.ceil(wait * 1000) if wait > 0 else 0)
@@ -93,6 +105,10 @@ class Live:
                     self._receive(descriptor, now)
         finally:
             self.close()
+
+    def _is_stirred(self) -> bool:
+        """Whether something came that cannot wait until it is due."""
+        return self.plant.hw.is_stirred(self._asks) or self.switchboard.stirred
 
     def turn(self, now: Instant) -> None:
         """Everything that is due at `now`."""
@@ -126,7 +142,7 @@ class Live:
 
     def _receive(self, descriptor: int, now: Instant) -> None:
         hw = self.plant.hw
-        for frame, channel in self.switchboard.receive(descriptor, now):
+        for frame, channel in self.switchboard.receive(descriptor, now, self._at_once):
             tracked = self.plant.take(frame, now)
             if tracked is not None and tracked.ids is not None:
                 self.switchboard.heard_vehicle(tracked.ids, channel, now.mono)

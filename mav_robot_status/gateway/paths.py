@@ -12,7 +12,7 @@ from struct import Struct
 from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from ..mavlink.framing import Frame
 
@@ -75,6 +75,17 @@ class Paths(Generic[C]):
     def vehicles(self) -> Iterable[tuple[int, int]]:
         """The ids of all vehicles that have been heard."""
         return self._paths.keys()
+
+    def keep(self, stays: Callable[[C], bool]) -> None:
+        """Forget the channels that do not stay; a vehicle that was heard on no other is forgotten."""
+        for ids, path in list(self._paths.items()):
+            others = {channel: way for channel, way in path.others.items() if stays(channel)}
+            if not stays(path.way.channel):
+                if not others:
+                    del self._paths[ids]
+                    continue
+                path.way = others.pop(max(others, key=lambda channel: others[channel].at))
+            path.others = others
 
     def take(self, ids: tuple[int, int], channel: C, now: float) -> None:
         """A frame is known to be newer than all before: the way that it came is the one that counts."""

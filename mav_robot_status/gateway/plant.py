@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from ..clock import Instant
 from ..config import ControllerConfig, PublisherConfig
+from ..controller import IndustrialRobotStatusController
 from ..errors import ConfigError, MavRobotStatusError
 from ..hardware.robot_hw import MavlinkRobotHW, Slot
 from ..interface import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle, LinkState, PublisherContext
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from ..config import Config
     from ..hardware.robot_hw import Tracked
-    from ..interface import MavlinkPort, Publisher
+    from ..interface import MavlinkPort, Metrics, Publisher
     from ..mavlink.framing import Frame
 
 NEVER: Final = Instant(0.0, 0)
@@ -80,13 +81,24 @@ class _Post:
 class Plant:
     """What turns frames into published statuses."""
 
-    def __init__(self, config: Config, port: MavlinkPort, stdout: TextIO, *, patient: bool = False) -> None:
-        """Build the parts. Raises ConfigError for a controller or publisher that cannot be had."""
+    def __init__(
+        self,
+        config: Config,
+        port: MavlinkPort,
+        stdout: TextIO,
+        *,
+        patient: bool = False,
+        metrics: Callable[[Instant], Metrics] | None = None,
+    ) -> None:
+        """Build the parts. Raises ConfigError for a controller or publisher that cannot be had.
+
+        `metrics` is for the publishers, see `PublisherContext`.
+        """
         slots = [Slot(v.system, v.component, v.handle) for v in config.vehicles]
         self.hw = MavlinkRobotHW(config.hardware, slots, config.identity.component)
         self._config = config
         self._controllers = config.controllers or (DEFAULT_CONTROLLER,)
-        self._context = PublisherContext({}, port, stdout, patient, self.explain)
+        self._context = PublisherContext({}, port, stdout, patient, self.explain, metrics)
         self.publishers: dict[tuple[str, str], Publisher] = {}
         self._posts: list[_Post] = []
         self._named = {slot.handle for slot in slots}
@@ -117,6 +129,11 @@ class Plant:
 
         tracked = self.hw.explained(handle, now)
         return None if tracked is None else explanation(tracked, now)
+
+    def skipped(self, publisher: Publisher) -> int:
+        """Messages that were due while this publisher was busy; a third party's controller need not count them."""
+        ours = (post.controller for post in self._posts if isinstance(post.controller, IndustrialRobotStatusController))
+        return sum(controller.skipped(publisher) for controller in ours)
 
     def tick(self, now: Instant) -> None:
         """Read the hardware, update the controllers, let the publishers do what waits."""

@@ -25,10 +25,12 @@ OURS: Final[dict[str, dict[str, str]]] = {
         ),
     },
     PUBLISHERS: {
+        "board": "mav_robot_status.publishers.board:BoardPublisher",
         "http": "mav_robot_status.publishers.web.publisher:HttpPublisher",
         "json": "mav_robot_status.publishers.json_lines:JsonLinesPublisher",
         "mavlink": "mav_robot_status.publishers.mavlink:MavlinkPublisher",
         "mirror": "mav_robot_status.publishers.mirror:MirrorPublisher",
+        "mqtt": "mav_robot_status.publishers.mqtt.publisher:MqttPublisher",
     },
 }
 

@@ -71,21 +71,37 @@ class Station:
     def __init__(self, config: LinkConfig, is_out: bool = False, number: int = 0, *, keep_all: bool = False) -> None:
         """Open the link. Raises LinkError, UsageError. `keep_all`: the parsers give every frame, to pass it on."""
         url = parse(config.url)
+        self.url = config.url
+        """As it was configured."""
         self.link: Link = open_link(url)
-        self.number = number
+        self._serial = url.kind == "serial"
+        self.number: int
         """Counts the links of a gateway from 0."""
-        self.robot_status = url.kind != "serial" if config.robot_status is None else config.robot_status
+        self.robot_status: bool
         """Whether ROBOT_STATUS is sent here if this is a vehicle's link."""
-        self.passive = config.passive
+        self.passive: bool
+        self._wanted: frozenset[int] | None = WANTED_IDS
+        self._channels: OrderedDict[Address, Channel] = OrderedDict()
+        self.adjust(config, number, keep_all=keep_all)
         self.is_out = is_out
         self.must_speak = url.kind in MUST_SPEAK
         self.listens = url.kind not in ONE_END
         """Whether each address that sends is an end of its own; else there is one, whoever answers."""
-        self._wanted = None if keep_all else WANTED_IDS
-        self._channels: OrderedDict[Address, Channel] = OrderedDict()
         self._source: Address = None
         if not self.listens:
             self._only = self._channels[None] = Channel(self, None, Parser(self._wanted))
+
+    def adjust(self, config: LinkConfig, number: int, *, keep_all: bool = False) -> None:
+        """What can be changed of an open link: everything but its URL."""
+        self.number, self.passive = number, config.passive
+        self.robot_status = not self._serial if config.robot_status is None else config.robot_status
+        wanted = None if keep_all else WANTED_IDS
+        if wanted is not self._wanted:
+            self._wanted = wanted
+            for channel in self._channels.values():
+                parser = Parser(wanted)
+                parser.counters.add(channel.parser.counters)
+                channel.parser = parser
 
     def channel(self, source: Address) -> Channel:
         """The channel of what one address sends."""

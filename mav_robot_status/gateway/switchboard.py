@@ -53,6 +53,8 @@ class Switchboard:
         self.offered: frozenset[int] = frozenset({HEARTBEAT} if config.identity.heartbeat else ())
         """The messages of ours that can be asked for."""
         self.paths: Paths[Channel] = Paths()
+        self.stirred = False
+        """Whether something came, since the last `service`, that cannot wait until it is due."""
         self.conflicts: set[tuple[int, int]] = set()
         """Ids that two autopilots claim, found since the last look."""
         self.stations: list[Station] = []
@@ -86,13 +88,13 @@ class Switchboard:
                 poll.register(descriptor, select.POLLIN)
                 self._watched[descriptor] = station
 
-    def receive(self, descriptor: int, now: Instant) -> list[Heard]:
+    def receive(self, descriptor: int, now: Instant, limit: int = 64) -> list[Heard]:
         """What has come on the link with this descriptor, of the kinds that a status needs."""
         heard: list[Heard] = []
         station = self._watched.get(descriptor)
         if station is None:
             return heard
-        for data, source in station.link.receive():
+        for data, source in station.link.receive(limit):
             channel = station.channel(source)
             frames = channel.parser.feed(data)
             if self._keep_all:
@@ -101,6 +103,8 @@ class Switchboard:
             for frame in frames:
                 if self._believes(frame, channel, now):
                     heard.append(Heard(frame, channel))
+        if station.link.stream and station.link.due() <= now.mono:  # the connection has ended
+            self.stirred = True
         return heard
 
     def _believes(self, frame: Frame, channel: Channel, now: Instant) -> bool:
@@ -134,6 +138,7 @@ class Switchboard:
         ends = self.paths.conflict(frame, channel)
         if ends is not None:
             ids = frame.system, frame.component
+            self.stirred = True
             self.conflicts.add(ids)
             log.warning("two autopilots claim the ids %d.%d: %s and %s", *ids, *ends)
         return False
@@ -162,6 +167,7 @@ class Switchboard:
             self._send(channel, self.component.heartbeat(found.system, False, channel.encoders))
         elif found.once == ROBOT_STATUS:
             vehicles = {system for system, _ in self.paths.vehicles()}
+            self.stirred = True
             self._requests |= {(channel, v) for v in vehicles if self.component.system_for(v) == found.system}
 
     def _pass_on(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant) -> None:
@@ -242,8 +248,14 @@ class Switchboard:
 
     # keeping the links
 
+    @property
+    def record_dropped(self) -> int | None:
+        """Frames that the recording has not; None: there is no recording."""
+        return None if self._recorder is None else self._recorder.dropped
+
     def service(self, now: float) -> None:
         """Connect and reconnect what waits for its turn."""
+        self.stirred = False
         if self._trust is not None:
             self._trust.keep()
         for station in self.stations:

@@ -168,6 +168,10 @@ class MavlinkRobotHW(RobotHW):
             self._hear(tracked, tracked.memory, message, now)
         return None
 
+    def is_stirred(self, asks: bool) -> bool:
+        """Whether something was taken that `read`, or `write` if it is called at all, should look at now."""
+        return bool(self.stirred) or (asks and self._ask_anew)
+
     def read(self, now: Instant) -> None:
         """Set the handles to what is so at `now`."""
         if self._unheard:
@@ -241,9 +245,29 @@ class MavlinkRobotHW(RobotHW):
             self._look_again(until)
         return min(self.deadline, self._asks_due)
 
-    def forget(self) -> None:
-        """Begin anew, as if nothing had been heard (a new segment of a log). Handles keep their vehicles."""
+    def adopt(self, other: MavlinkRobotHW) -> None:
+        """Go on with the vehicles of another, as this one's options and slots have it. The other is used no more.
+
+        Statuses stay as they are until the next `read`.
+        """
+        for ids, theirs in other._tracked.items():
+            tracked = None if theirs.memory is None else self._place(ids)
+            if tracked is None:
+                continue
+            ours = tracked.handle
+            ours.status, ours.detail, ours.heard_at = theirs.handle.status, theirs.handle.detail, theirs.handle.heard_at
+            tracked.memory, tracked.boots = theirs.memory, theirs.boots
+            tracked.requests, tracked.parameters = theirs.requests, theirs.parameters
+            self._stir(tracked)
+
+    def forget(self, keep: Container[tuple[int, int]] = ()) -> None:
+        """Begin anew, as if nothing had been heard (a new segment of a log). Handles keep their vehicles.
+
+        Those with the ids `keep` are not forgotten.
+        """
         for tracked in self._tracked.values():
+            if tracked.ids in keep:
+                continue
             tracked.memory = None
             tracked.boots = 0
             tracked.dirty, tracked.deadline, tracked.checked = False, math.inf, -math.inf
@@ -252,8 +276,9 @@ class MavlinkRobotHW(RobotHW):
             tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)
             tracked.handle.heard_at = None
             tracked.handle.evidence = {}
-        self.stirred.clear()
-        self.deadline, self._unheard = math.inf, True
+        self.stirred = [tracked for tracked in self.stirred if tracked.dirty]
+        self.deadline = min((tracked.deadline for tracked in self._tracked.values()), default=math.inf)
+        self._unheard = True
 
     def _tell_unheard(self, now: Instant) -> None:
         """Once: a vehicle that was never heard cannot move as far as one knows."""
@@ -301,18 +326,24 @@ class MavlinkRobotHW(RobotHW):
         """The place of an autopilot that is heard for the first time."""
         if not is_autopilot(heartbeat, ids[1]):
             return None
+        tracked = self._place(ids)
+        if tracked is None:
+            self.ignored += 1
+            return None
+        names = named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), named(mav.TYPE_NAMES, heartbeat.type)
+        log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
+        return tracked
+
+    def _place(self, ids: tuple[int, int]) -> Tracked | None:
+        """The place of a vehicle that has none yet; None if there is none for it."""
         tracked = next((t for t in self._expected if t.matches(*ids)), None)
         if tracked is None and self._open and len(self._tracked) < MOST_VEHICLES:
             name = DEFAULT_HANDLE_NAME if not self._tracked else f"{DEFAULT_HANDLE_NAME}/{ids[0]}.{ids[1]}"
             tracked = Tracked(Slot(*ids, name))
             self.handles.register_handle(tracked.handle)
-        if tracked is None:
-            self.ignored += 1
-            return None
-        tracked.ids = ids
-        self._tracked[ids] = tracked
-        names = named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), named(mav.TYPE_NAMES, heartbeat.type)
-        log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
+        if tracked is not None:
+            tracked.ids = ids
+            self._tracked[ids] = tracked
         return tracked
 
     def _hear(self, tracked: Tracked, memory: Memory, message: Any, now: Instant) -> None:

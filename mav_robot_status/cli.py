@@ -26,10 +26,12 @@ if TYPE_CHECKING:
 PROGRAM: Final = "mav-robot-status"
 OVERRIDES: Final = (
     "out", "rate", "changes_only", "json", "format", "system", "baud", "passive", "signing_key", "record", "forward",
-    "http", "http_token_file", "http_open",
+    "http", "http_token_file", "http_open", "mqtt", "mqtt_robot", "mqtt_spool",
 )  # fmt: skip
 """Options that override the configuration."""
 FORMATS: Final = ("native", "ros1", "ros2")
+OF_BROKER: Final = ("user", "password_file", "ca", "cert", "key", "version", "keepalive")
+"""Options of `--mqtt` that the board has too."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -64,13 +66,13 @@ def _run(arguments: list[str]) -> int:
 def run(options: argparse.Namespace) -> int:
     """The main job: links in, statuses out."""
     _log_to_stderr(options)
-    config = overridden(load_config(options.config) if options.config else Config(), options)
-    if not config.links:
-        raise UsageError(f"no connection given; write for example {PROGRAM} udp:127.0.0.1:14550")
+    config = _to_run(options)
     urls = [parse(link.url) for link in config.links]
     logs = [url for url in urls if url.kind == "log"]
     if logs and options.http is not None:
         raise UsageError(f"{logs[0].text}: a recorded log has no live page; write `{PROGRAM} report {logs[0].text}`")
+    if logs and options.mqtt is not None:
+        raise UsageError(f"{logs[0].text}: a recorded log is no robot's status now: replay it without --mqtt")
     if logs and (len(urls) > 1 or config.outs):
         raise UsageError(f"{logs[0].text}: a recorded log is replayed alone, without other connections or --out")
     if logs and (config.record is not None or config.forward):
@@ -81,11 +83,29 @@ def run(options: argparse.Namespace) -> int:
         replay(config, logs[0].device, sys.stdout)
         return 0
     from .gateway.live import Live
+    from .gateway.notify import Notifier
 
-    gateway = Live(config, sys.stdout)
+    gateway = Live(config, sys.stdout, notifier=Notifier())
     gateway.stop_on_signals()
+    if options.config:
+        gateway.reload_on_hangup(lambda: _to_run_live(options))
     gateway.run()
     return 0
+
+
+def _to_run(options: argparse.Namespace) -> Config:
+    config = overridden(load_config(options.config) if options.config else Config(), options)
+    if not config.links:
+        raise UsageError(f"no connection given; write for example {PROGRAM} udp:127.0.0.1:14550")
+    return config
+
+
+def _to_run_live(options: argparse.Namespace) -> Config:
+    config = _to_run(options)
+    for link in config.links:
+        if parse(link.url).kind == "log":
+            raise UsageError(f"{link.url}: a recorded log is replayed alone, by a command of its own")
+    return config
 
 
 def explain(options: argparse.Namespace) -> int:
@@ -158,6 +178,43 @@ def report(options: argparse.Namespace) -> int:
     return 0
 
 
+def watch(options: argparse.Namespace) -> int:
+    """A live table of the vehicles, until the person ends it."""
+    _log_to_stderr(options)
+    from .gateway.watched import Watched
+    from .views.terminal import show
+
+    config = overridden(load_config(options.config) if options.config else Config(), options)
+    if not config.links:
+        raise UsageError(f"no connection given; write for example {PROGRAM} watch udp:127.0.0.1:14550")
+    for url in (parse(link.url) for link in config.links):
+        if url.kind == "log":
+            raise UsageError(f"{url.text} is a recorded log; see it as a picture: {PROGRAM} report {url.text}")
+    with Watched(config) as source:
+        show(source)
+    return 0
+
+
+def board(options: argparse.Namespace) -> int:
+    """All robots of an MQTT broker on one page, until it is ended."""
+    _log_to_stderr(options)
+    from .publishers.mqtt.options import read_broker
+    from .publishers.web.options import read as read_web
+
+    broker = read_broker(_mqtt_options(options, options.broker, OF_BROKER))
+    page = read_web(_page_options(options))
+    try:
+        from .gateway.board import FleetBoard
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("mav_robot_status"):
+            raise
+        raise UsageError("the board needs extras: pip install 'mav-robot-status[mqtt,web]'") from None
+    fleet = FleetBoard(broker, page)
+    fleet.stop_on_signals()
+    fleet.run()
+    return 0
+
+
 def demo(options: argparse.Namespace) -> int:
     """A fake autopilot and the gateway, in one process."""
     _log_to_stderr(options)
@@ -192,6 +249,8 @@ COMMANDS: Final[dict[str, Callable[[argparse.Namespace], int]]] = {
     "explain": explain,
     "doctor": doctor,
     "report": report,
+    "watch": watch,
+    "board": board,
     "demo": demo,
     "check-config": check_config,
     "dialect": dialect,
@@ -215,7 +274,7 @@ def overridden(config: Config, options: argparse.Namespace) -> Config:
         config,
         links=links,
         outs=outs,
-        controllers=_with_page(_controllers(config, options), options),
+        controllers=_with_mqtt(_with_page(_controllers(config, options), options), options),
         signing=_signing(config.signing, options.signing_key),
         record=config.record if options.record is None else options.record,
         forward=config.forward or bool(options.forward),
@@ -279,20 +338,45 @@ def _with_page(controllers: tuple[ControllerConfig, ...], options: argparse.Name
             if getattr(options, option):
                 raise UsageError(f"--{option.replace('_', '-')} is for a web page: add --http 127.0.0.1:8765")
         return controllers
-    from .gateway.plant import DEFAULT_CONTROLLER, DEFAULT_PUBLISHERS
+    return _with(controllers, PublisherConfig("http", _page_options(options)))
 
+
+def _page_options(options: argparse.Namespace) -> dict[str, object]:
     asked: dict[str, object] = {"listen": options.http}
     if options.http_token_file:
         asked["token_file"] = options.http_token_file
     if options.http_open:
         asked["open"] = True
-    page = PublisherConfig("http", asked)
+    return asked
+
+
+def _with_mqtt(controllers: tuple[ControllerConfig, ...], options: argparse.Namespace) -> tuple[ControllerConfig, ...]:
+    """The controllers with the broker of the command line, instead of one in the configuration."""
+    names = (*OF_BROKER, "robot", "spool")
+    if options.mqtt is None:
+        for name in names:
+            if getattr(options, f"mqtt_{name}", None):
+                wanted = f"--mqtt-{name.replace('_', '-')}"
+                raise UsageError(f"{wanted} is for a broker: add --mqtt mqtts://broker/prefix")
+        return controllers
+    return _with(controllers, PublisherConfig("mqtt", _mqtt_options(options, options.mqtt, names)))
+
+
+def _mqtt_options(options: argparse.Namespace, url: str, names: tuple[str, ...]) -> dict[str, object]:
+    given = {name: getattr(options, f"mqtt_{name}", None) for name in names}
+    return {"url": url, **{name: value for name, value in given.items() if value is not None}}
+
+
+def _with(controllers: tuple[ControllerConfig, ...], asked: PublisherConfig) -> tuple[ControllerConfig, ...]:
+    """The controllers with a publisher, instead of one of its type."""
+    from .gateway.plant import DEFAULT_CONTROLLER, DEFAULT_PUBLISHERS
+
     return tuple(
         dataclasses.replace(
             c,
             publishers=(
-                *(p for p in (DEFAULT_PUBLISHERS if c.publishers is None else c.publishers) if p.type != "http"),
-                page,
+                *(p for p in (DEFAULT_PUBLISHERS if c.publishers is None else c.publishers) if p.type != asked.type),
+                asked,
             ),
         )
         for c in controllers or (DEFAULT_CONTROLLER,)
@@ -333,6 +417,10 @@ def _parser() -> argparse.ArgumentParser:
     runs.add_argument("--signing-key", metavar="FILE", help="sign what is sent, believe only what is signed")
     runs.add_argument("--record", metavar="FILE", help="record everything received and sent")
     _web(runs)
+    runs.add_argument("--mqtt", metavar="URL", help="statuses and events to a broker, e.g. mqtts://broker/robots")
+    runs.add_argument("--mqtt-robot", metavar="NAME", help="what a robot is called there ({host}-{system})")
+    runs.add_argument("--mqtt-spool", metavar="FILE", help="where events wait that cannot be delivered")
+    _broker(runs)
     runs.add_argument("--forward", action="store_true", help="pass every frame on between the links and the outs")
     runs.add_argument("--passive", action="store_true", help="never send anything on the vehicle links")
     _verbosity(runs)
@@ -379,6 +467,27 @@ def _parser() -> argparse.ArgumentParser:
     reports.add_argument("--system", type=_system, metavar="N", help="only the vehicle with this system id")
     _verbosity(reports)
 
+    watches = commands.add_parser(
+        "watch",
+        help="a live table in the terminal; ? there tells the keys",
+        epilog=help_text(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    watches.add_argument("connections", nargs="*", metavar="CONNECTION", help="where MAVLink comes from; see below")
+    watches.add_argument("--config", metavar="FILE", help="configuration (YAML)")
+    watches.add_argument("--system", type=_system, metavar="N", help="only the vehicle with this system id")
+    watches.add_argument("--baud", type=_baud, metavar="N", help="baud rate of serial connections (57600)")
+    watches.add_argument("--signing-key", metavar="FILE", help="believe only what is signed with this key")
+    watches.add_argument("--passive", action="store_true", help="never send anything on the vehicle links")
+    _verbosity(watches)
+
+    boards = commands.add_parser("board", help="all robots of an MQTT broker on one web page")
+    boards.add_argument("broker", metavar="URL", help="what the gateways were given, e.g. mqtts://broker/robots")
+    _web(boards)
+    boards.set_defaults(http="127.0.0.1:8765")
+    _broker(boards)
+    _verbosity(boards)
+
     demos = commands.add_parser("demo", help="a fake autopilot and the gateway in one process; about 30 s")
     demos.add_argument("--loop", action="store_true", help="begin again when it ends")
     _web(demos)
@@ -396,6 +505,20 @@ def _web(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--http", metavar="HOST:PORT", help="the statuses as a live web page, e.g. on 127.0.0.1:8765")
     parser.add_argument("--http-token-file", metavar="FILE", help="show the page's data only to who has this token")
     parser.add_argument("--http-open", action="store_true", help="show them to everybody who can reach HOST:PORT")
+
+
+def _broker(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--mqtt-user", metavar="NAME", help="who we are to the broker")
+    parser.add_argument(
+        "--mqtt-password-file", metavar="FILE", help="the password, unless it is in MAV_ROBOT_STATUS_MQTT_PASSWORD"
+    )
+    parser.add_argument("--mqtt-ca", metavar="FILE", help="authority to believe (PEM), instead of the system's")
+    parser.add_argument("--mqtt-cert", metavar="FILE", help="our own certificate (PEM)")
+    parser.add_argument("--mqtt-key", metavar="FILE", help="its key, if it is not in the same file")
+    parser.add_argument("--mqtt-version", choices=("5", "3.1.1"), help="of the protocol (5)")
+    parser.add_argument(
+        "--mqtt-keepalive", type=float, metavar="S", help="how soon a broken connection is noticed, in seconds (10)"
+    )
 
 
 def _verbosity(parser: argparse.ArgumentParser) -> None:

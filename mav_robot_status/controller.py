@@ -122,6 +122,10 @@ class IndustrialRobotStatusController:
             log.warning("%s: an output was busy %d times, and messages were skipped", self.handle.name, skipped)
         self._outputs = []
 
+    def skipped(self, publisher: Publisher) -> int:
+        """How often a message was due, and this publisher was busy; since `starting`."""
+        return sum(output.skipped for output in self._outputs if output.publisher is publisher)
+
     def next_due(self, now: float) -> float:
         """The time (monotonic seconds) at which `update` has something to do, if the handle does not change before."""
         due = math.inf

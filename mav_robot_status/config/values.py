@@ -119,6 +119,8 @@ def _annotated(hint: Any, node: Node) -> Any:
         return _one_of(node.text, names.names, node)
     if dataclasses.is_dataclass(base):
         return read_fields(base, node)
+    if base in (bool, str):
+        return _KINDS[base](node)
     return _number(base, node, by_type.get(Within), word)
 
 

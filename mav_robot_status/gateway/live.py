@@ -11,9 +11,11 @@ from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
+from ..errors import MavRobotStatusError
 from ..mavlink.commands import ROBOT_STATUS
 from .metrics import metrics
-from .plant import Plant
+from .notify import Notifier
+from .plant import Plant, check
 from .switchboard import Switchboard
 
 if TYPE_CHECKING:
@@ -37,22 +39,25 @@ MOST_AT_ONCE, MOST_GATHERED = 64, 1024
 class Live:
     """The gateway on live links."""
 
-    def __init__(self, config: Config, stdout: TextIO, clock: Callable[[], Instant] = present) -> None:
-        """Open everything. Raises LinkError, ConfigError."""
+    def __init__(
+        self,
+        config: Config,
+        stdout: TextIO,
+        clock: Callable[[], Instant] = present,
+        notifier: Notifier | None = None,
+    ) -> None:
+        """Open everything. Raises LinkError, ConfigError. `notifier`: tells systemd; None: there is nobody to tell."""
         self._clock = clock
-        self._config = config
-        self._asks = config.requests == "missing" and not all(link.passive for link in config.links)
-        self._at_once = MOST_GATHERED if config.coalesce else MOST_AT_ONCE
+        self._notifier = Notifier({}) if notifier is None else notifier
         self._beat_at = self._told_at = -math.inf
-        self._stop = False
+        self._stop = self._hung_up = False
+        self._reread: Callable[[], Config] | None = None
         self._handlers: dict[int, Any] = {}
         with ExitStack() as opened:  # what fails half-way leaves nothing open
             self.switchboard = Switchboard(config, clock)
             opened.callback(self.switchboard.close)
             self.plant = Plant(config, self.switchboard, stdout, metrics=self.metrics)
-            self.plant.hw.own_system = config.identity.system
-            if self.plant.publishes("mavlink"):
-                self.switchboard.offered |= {ROBOT_STATUS}
+            self._go_by(config)
             self._wake_read, self._wake_write = socket.socketpair()
             opened.pop_all()
         self._wake_read.setblocking(False)
@@ -78,6 +83,14 @@ class Live:
         for number in (signal.SIGINT, signal.SIGTERM):
             self._handlers[number] = signal.signal(number, lambda *_: self.stop())
 
+    def reload_on_hangup(self, reread: Callable[[], Config]) -> None:
+        """SIGHUP reads the configuration again, until the gateway is closed. Only in the main thread.
+
+        `reread` raises MavRobotStatusError if the new one is no good.
+        """
+        self._reread = reread
+        self._handlers[signal.SIGHUP] = signal.signal(signal.SIGHUP, lambda *_: self._hang_up())
+
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Turn the loop until `stop`, or until `until` says so at one of its turns.
 
@@ -85,11 +98,14 @@ class Live:
         """
         now = self._clock()
         self._told_at = now.mono + FIRST_SILENCE
-        poll = select.poll()
-        poll.register(self._wake_read, select.POLLIN)
+        poll = self._new_poll()
         due = -math.inf
+        self._notifier.ready()
         try:
             while not (self._stop or until()):
+                if self._hung_up:
+                    self._reload(now)
+                    poll, due = self._new_poll(), -math.inf
                 if self._is_stirred() or now.mono >= due:  # most of what comes changes nothing, and costs no turn
                     self.switchboard.watch(poll)
                     self.turn(now)
@@ -112,6 +128,7 @@ class Live:
 
     def turn(self, now: Instant) -> None:
         """Everything that is due at `now`."""
+        self._notifier.turn(now.mono)
         self.switchboard.service(now.mono)
         self.plant.tick(now)
         if self._asks:
@@ -125,7 +142,9 @@ class Live:
 
     def close(self) -> None:
         """Stop the plant, close the links, tell in the log what was counted."""
+        self._notifier.stopping()
         with ExitStack() as steps:  # each is done, whatever the others raise
+            steps.callback(self._notifier.close)
             for number, handler in self._handlers.items():
                 steps.callback(signal.signal, number, handler)
             steps.callback(self._wake_read.close)
@@ -133,6 +152,48 @@ class Live:
             steps.callback(self.switchboard.close)
             steps.callback(self._tell_losses)
             steps.callback(self.plant.close, self._clock())
+
+    def _new_poll(self) -> select.poll:
+        poll = select.poll()
+        poll.register(self._wake_read, select.POLLIN)
+        return poll
+
+    def _hang_up(self) -> None:
+        self._hung_up = True
+        with suppress(OSError):
+            self._wake_write.send(b"x")
+
+    def _reload(self, now: Instant) -> None:
+        """Go on by the configuration as it is now; by the one that there was if the new one is no good."""
+        self._hung_up = False
+        with suppress(BlockingIOError):
+            self._wake_read.recv(4096)
+        assert self._reread is not None
+        self._notifier.reloading(now.mono)
+        try:
+            config = self._reread()
+            check(config)
+            if config != self._config:
+                self._change(config, now)
+            log.info("the configuration was read again")
+        except MavRobotStatusError as error:
+            log.error("the configuration stays as it was: %s", error)
+            if self.switchboard.config is not self._config:
+                self._change(self._config, now)  # what cannot be had again ends the gateway
+        self._notifier.ready()
+
+    def _change(self, config: Config, now: Instant) -> None:
+        self.switchboard.change(config)
+        self.plant.change(config, frozenset(self.switchboard.paths.vehicles()), now)
+        self._go_by(config)
+
+    def _go_by(self, config: Config) -> None:
+        """Everything that this configuration names is open."""
+        self._config = config
+        self._asks = config.requests == "missing" and not all(link.passive for link in config.links)
+        self._at_once = MOST_GATHERED if config.coalesce else MOST_AT_ONCE
+        if self.plant.publishes("mavlink"):
+            self.switchboard.offered |= {ROBOT_STATUS}
 
     def _gather(self, due: float) -> None:
         """Let more input come, so that fewer wake-ups serve it; `stop` ends this, and so does what falls due."""
@@ -160,6 +221,7 @@ class Live:
 
     def _next_due(self, now: float) -> float:
         due = min(self.plant.next_due(now, now + LONGEST_WAIT), self._told_at, self.switchboard.next_due())
+        due = min(due, self._notifier.next_due())
         return min(due, self._beat_at + HEARTBEAT_PERIOD) if self._config.identity.heartbeat else due
 
     def _tell_losses(self) -> None:

@@ -20,7 +20,7 @@ from . import plugins
 from .guard import Guard, GuardedPublisher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Container, Iterator
 
     from ..config import Config
     from ..hardware.robot_hw import Tracked
@@ -66,6 +66,11 @@ def _publishers(controller: ControllerConfig) -> tuple[PublisherConfig, ...]:
     return DEFAULT_PUBLISHERS if controller.publishers is None else controller.publishers
 
 
+def _key(config: PublisherConfig) -> tuple[str, str]:
+    """What two controllers share: one publisher for each type and set of options."""
+    return config.type, repr(sorted(config.options.items()))
+
+
 class _Post:
     """A controller, under guard, and the handle that it waits for, or publishes."""
 
@@ -94,26 +99,49 @@ class Plant:
 
         `metrics` is for the publishers, see `PublisherContext`.
         """
-        slots = [Slot(v.system, v.component, v.handle) for v in config.vehicles]
-        self.hw = MavlinkRobotHW(config.hardware, slots, config.identity.component)
-        self._config = config
-        self._controllers = config.controllers or (DEFAULT_CONTROLLER,)
         self._context = PublisherContext({}, port, stdout, patient, self.explain, metrics)
         self.publishers: dict[tuple[str, str], Publisher] = {}
+        self._service_due = math.inf
+        self.now = NEVER
+        """Up to when it has lived."""
+        with ExitStack() as undo:
+            undo.callback(self._close_publishers)
+            self._furnish(config)
+            undo.pop_all()
+
+    def _furnish(self, config: Config) -> None:
+        """Make what the configuration names, but for the publishers that are there."""
+        check(config)
+        slots = [Slot(v.system, v.component, v.handle) for v in config.vehicles]
+        self.hw = MavlinkRobotHW(config.hardware, slots, config.identity.component)
+        self.hw.own_system = config.identity.system
+        self._controllers = config.controllers or (DEFAULT_CONTROLLER,)
         self._posts: list[_Post] = []
         self._named = {slot.handle for slot in slots}
         """Handles that publish from the start, before their vehicle is heard."""
         self._seen: set[str] = set()
-        self._service_due = math.inf
-        self.now = NEVER
-        """Up to when it has lived."""
+        for controller in self._controllers:  # before a vehicle is heard: what is wrong with an output shows now
+            self._publishers(controller)
+        self._attend()
+
+    def change(self, config: Config, keep: Container[tuple[int, int]], now: Instant) -> None:
+        """Live on by another configuration. The vehicles with the ids `keep` are kept, and the publishers that stay.
+
+        A last status tells that the other vehicles are not known any more. Raises as the constructor does; then some
+        parts are gone: change back.
+        """
         check(config)
-        with ExitStack() as undo:
-            undo.callback(self._close_publishers)
-            for controller in self._controllers:  # before a vehicle is heard: what is wrong with an output shows now
-                self._publishers(controller)
-            self._attend()
-            undo.pop_all()
+        self.hw.forget(keep)
+        self.tick(now)
+        self._stop(now)
+        stay = {_key(p) for c in config.controllers or (DEFAULT_CONTROLLER,) for p in _publishers(c)}
+        for key in self.publishers.keys() - stay:  # before others are opened: they may want the same port
+            self.publishers.pop(key).close()
+        before = self.hw
+        try:
+            self._furnish(config)
+        finally:
+            self.hw.adopt(before)
 
     def publishes(self, kind: str) -> bool:
         """Whether there is a publisher of this type."""
@@ -222,8 +250,8 @@ class Plant:
         return [self._publisher(p, config.where) for p in heard]
 
     def _publisher(self, config: PublisherConfig, where: str) -> Publisher:
-        """One publisher for each type and set of options: two controllers may share an output."""
-        key = (config.type, repr(sorted(config.options.items())))
+        """The publisher that there is, or a new one."""
+        key = _key(config)
         if key not in self.publishers:
             make: Callable[[PublisherContext], Publisher] = plugins.load(plugins.PUBLISHERS, config.type, where)
             with _explained(f"{where}: publisher '{config.type}'"):

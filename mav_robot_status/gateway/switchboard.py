@@ -8,6 +8,7 @@ import select
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from ..config import Config
 from ..hardware.robot_hw import COMMAND_IDS, WANTED_IDS
 from ..interface import Audience, TriState
 from ..link.record import TlogWriter
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from ..clock import Instant
-    from ..config import Config
+    from ..config import SigningConfig
     from ..hardware.robot_hw import Tracked
     from ..mavlink.framing import Frame
     from .station import Channel
@@ -49,8 +50,9 @@ class Switchboard:
     def __init__(self, config: Config, clock: Callable[[], Instant]) -> None:
         """Open everything. Raises LinkError, UsageError."""
         self._clock = clock
-        self.component = Component(config.identity.component, config.identity.system)
-        self.offered: frozenset[int] = frozenset({HEARTBEAT} if config.identity.heartbeat else ())
+        self.config = Config()
+        self.component = Component()
+        self.offered: frozenset[int]
         """The messages of ours that can be asked for."""
         self.paths: Paths[Channel] = Paths()
         self.stirred = False
@@ -62,17 +64,74 @@ class Switchboard:
         self._requests: set[tuple[Channel, int]] = set()
         self._ends: tuple[Channel, ...] | None = None
         """Everyone a frame may be passed on to; None: to be found anew."""
-        self._router: Router[Channel] | None = Router() if config.forward else None
+        self._router: Router[Channel] | None = None
+        self._keep_all = False
+        self._trust: Trust | None = None
+        self._recorder: TlogWriter | None = None
+        try:
+            self.change(config)
+        except BaseException:  # what fails half-way leaves nothing open
+            for station in self.stations:
+                station.link.close()
+            self._secure(None)
+            raise
+
+    def change(self, config: Config) -> None:
+        """Open what this configuration has more, close what it has less, and keep every other link and its peers.
+
+        The caller's poll object is to be made anew. Raises LinkError, UsageError; then some links are closed: change
+        back.
+        """
+        before, self.config = self.config, config
+        if config.identity != before.identity:
+            self.component = Component(config.identity.component, config.identity.system)
+        self.offered = frozenset({HEARTBEAT} if config.identity.heartbeat else ())
         self._keep_all = config.forward or config.record is not None
-        with ExitStack() as opened:  # what fails half-way leaves nothing open
-            self._trust = Trust(config.signing, clock()) if config.signing else None
-            for link, is_out in [*((link, False) for link in config.links), *((out, True) for out in config.outs)]:
-                self.stations.append(Station(link, is_out, len(self.stations), keep_all=self._keep_all))
-                opened.callback(self.stations[-1].link.close)
-            self._recorder = None if config.record is None else TlogWriter(config.record)
-            opened.pop_all()
-        for station in self.stations:
+        places = [*((link, False) for link in config.links), *((out, True) for out in config.outs)]
+        rest = list(self.stations)
+        kept = [_taken(rest, link.url, is_out) for link, is_out in places]
+        self.stations = [station for station in kept if station is not None]
+        self._let_go(rest)
+        if not config.forward or self._router is None or rest:
+            self._router = Router() if config.forward else None
+        if config.signing != before.signing:
+            self._secure(config.signing)
+        for number, ((link, is_out), station) in enumerate(zip(places, kept, strict=True)):
+            if station is not None:
+                station.adjust(link, number, keep_all=self._keep_all)
+                continue
+            station = Station(link, is_out, number, keep_all=self._keep_all)
+            self.stations.append(station)
             log.info("%s%s", station.link.text, " (passive)" if station.passive else "")
+        self.stations.sort(key=lambda station: station.number)
+        if config.record != before.record:
+            self._record(config.record)
+
+    def _let_go(self, stations: list[Station]) -> None:
+        """Close links, and forget whom was heard there only."""
+        self._close_links(stations)
+        self._watched.clear()
+        self._ends = None
+        self._requests = {(channel, ids) for channel, ids in self._requests if channel.station in self.stations}
+        self.paths.keep(lambda channel: channel.station in self.stations)
+
+    def _close_links(self, stations: list[Station]) -> None:
+        with ExitStack() as steps:  # each is done, whatever the others raise
+            for station in stations:
+                steps.callback(station.link.close)
+                steps.callback(_tell_counters, station)
+
+    def _secure(self, config: SigningConfig | None) -> None:
+        former, self._trust = self._trust, None
+        if former is not None:
+            former.close()
+        self._trust = None if config is None else Trust(config, self._clock())
+
+    def _record(self, path: str | None) -> None:
+        former, self._recorder = self._recorder, None
+        if former is not None:
+            former.close()
+        self._recorder = None if path is None else TlogWriter(path)
         if self._recorder is not None:
             log.info("%s", self._recorder.text)
 
@@ -269,13 +328,9 @@ class Switchboard:
     def close(self) -> None:
         """Close the links, tell in the log what was counted."""
         with ExitStack() as steps:  # each is done, whatever the others raise
-            for station in self.stations:
-                steps.callback(station.link.close)
-                steps.callback(_tell_counters, station)
-            if self._trust is not None:
-                steps.callback(self._trust.close)
-            if self._recorder is not None:
-                steps.callback(self._recorder.close)
+            steps.callback(self._close_links, self.stations)
+            steps.callback(self._secure, None)
+            steps.callback(self._record, None)
         if self.paths.duplicates:
             log.info("%d frames came a second way, %d changes of the way", self.paths.duplicates, self.paths.changes)
 
@@ -288,6 +343,14 @@ class Switchboard:
                 log.warning("no autopilot heard yet, %s: %s so far", station.link.text, heard)
         if self._trust is not None and (found := self._trust.summary()):
             log.warning("signing: %s", found)
+
+
+def _taken(stations: list[Station], url: str, is_out: bool) -> Station | None:
+    """The station of this connection, taken out of those that are there."""
+    found = next((s for s in stations if s.url == url and s.is_out is is_out), None)
+    if found is not None:
+        stations.remove(found)
+    return found
 
 
 def _tell_counters(station: Station) -> None:

@@ -251,12 +251,13 @@ class MavlinkRobotHW(RobotHW):
         Statuses stay as they are until the next `read`.
         """
         for ids, theirs in other._tracked.items():
-            tracked = None if theirs.memory is None else self._place(ids)
+            name = theirs.handle.name if other._open else None
+            tracked = None if theirs.memory is None else self._place(ids, name)
             if tracked is None:
                 continue
             ours = tracked.handle
             ours.status, ours.detail, ours.heard_at = theirs.handle.status, theirs.handle.detail, theirs.handle.heard_at
-            tracked.memory, tracked.boots = theirs.memory, theirs.boots
+            tracked.memory, tracked.boots, tracked.losses = theirs.memory, theirs.boots, theirs.losses
             tracked.requests, tracked.parameters = theirs.requests, theirs.parameters
             self._stir(tracked)
 
@@ -334,11 +335,12 @@ class MavlinkRobotHW(RobotHW):
         log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
         return tracked
 
-    def _place(self, ids: tuple[int, int]) -> Tracked | None:
-        """The place of a vehicle that has none yet; None if there is none for it."""
+    def _place(self, ids: tuple[int, int], name: str | None = None) -> Tracked | None:
+        """The place of a vehicle that has none yet; None if there is none. `name`: of its handle if that is new."""
         tracked = next((t for t in self._expected if t.matches(*ids)), None)
         if tracked is None and self._open and len(self._tracked) < MOST_VEHICLES:
-            name = DEFAULT_HANDLE_NAME if not self._tracked else f"{DEFAULT_HANDLE_NAME}/{ids[0]}.{ids[1]}"
+            if name is None:
+                name = DEFAULT_HANDLE_NAME if not self._tracked else f"{DEFAULT_HANDLE_NAME}/{ids[0]}.{ids[1]}"
             tracked = Tracked(Slot(*ids, name))
             self.handles.register_handle(tracked.handle)
         if tracked is not None:

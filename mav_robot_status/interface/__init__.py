@@ -1,6 +1,7 @@
 """The contract that hardware interfaces and controllers share; see `status`, `handle`, `registry`."""
 
 from .handle import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle
+from .metrics import ConnectionMetrics, Metrics, PublisherMetrics
 from .publisher import Audience, MavlinkPort, Publisher, PublisherContext
 from .registry import IndustrialRobotStatusInterface, InterfaceManager, RobotHW
 from .status import (
@@ -19,6 +20,7 @@ from .status import (
 __all__ = [
     "DEFAULT_HANDLE_NAME",
     "Audience",
+    "ConnectionMetrics",
     "Detail",
     "ErrorCause",
     "Evidence",
@@ -28,8 +30,10 @@ __all__ = [
     "InterfaceManager",
     "LinkState",
     "MavlinkPort",
+    "Metrics",
     "Publisher",
     "PublisherContext",
+    "PublisherMetrics",
     "RobotHW",
     "RobotMode",
     "RobotStatus",

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 
     from ..clock import Instant
+    from .metrics import Metrics
     from .status import RobotStatusMsg
 
 
@@ -67,3 +68,5 @@ class PublisherContext(NamedTuple):
     explain: Callable[[str, Instant], Mapping[str, Any] | None] | None = None
     """Why each field of a handle has its value, as `explain --as-json` tells it; None for an unknown handle, or one
     whose vehicle was not heard. Only for the gateway's own thread, and not for free: a tenth of a millisecond."""
+    metrics: Callable[[Instant], Metrics] | None = None
+    """What the gateway counts and what is so now, as `/metrics` tells it. Only for the gateway's own thread."""

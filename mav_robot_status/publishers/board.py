@@ -96,7 +96,7 @@ class Board:
         entry.heartbeat_age = None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
 
     def take_line(self, handle: str, line: Mapping[str, Any], now: float) -> None:
-        """The newest line of a handle of another process, parsed; whatever it holds."""
+        """The newest line of a handle of another process, parsed; whatever it holds, `handle` is its name here."""
         entry = self._entry(handle, now)
         if entry is None:
             return
@@ -104,6 +104,7 @@ class Board:
         link = line.get("link")
         link = link if isinstance(link, dict) else {}
         rest = {key: value for key, value in line.items() if key not in ("stamp", "seq")}
+        rest["handle"] = handle
         rest["link"] = {key: value for key, value in link.items() if key != "heartbeat_age"}
         if rest != entry.line:
             self._change(entry, rest, stamp, now)
@@ -160,7 +161,8 @@ class BoardPublisher:
 def _order(entry: Entry) -> tuple[bool, int, int, str]:
     system, component = entry.line.get("system"), entry.line.get("component")
     known = isinstance(system, int)
-    return not known, system if isinstance(system, int) else 0, component or 0, str(entry.line.get("handle", ""))
+    number = component if isinstance(component, int) else 0
+    return not known, system if isinstance(system, int) else 0, number, str(entry.line.get("handle", ""))
 
 
 def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tuple[str, Any, Any]]:

@@ -119,6 +119,11 @@ class JsonLinesPublisher:
         """True while an earlier line is not wholly written, or the reader has no room for another."""
         return not self._patient and (bool(self._rest) or not self._writable())
 
+    @property
+    def queued(self) -> int:
+        """1 while a line is not wholly written."""
+        return int(bool(self._rest))
+
     def publish(self, msg: RobotStatusMsg) -> None:
         """Write one line."""
         seq = self._seq.get(msg.handle, 0)

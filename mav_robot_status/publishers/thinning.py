@@ -95,6 +95,11 @@ class ThinnedPublisher(ABC, Generic[S]):
         """Never: what is too much is held back, and only its last state is kept."""
         return False
 
+    @property
+    def queued(self) -> int:
+        """Handles about which something is held back."""
+        return len(self._waiting)
+
     def publish(self, msg: RobotStatusMsg) -> None:
         """Hold the message; `service`, called after every round of updates, sends it where it is its turn."""
         if msg.detail.system is None or msg.detail.link is LinkState.NEVER_SEEN:

@@ -223,7 +223,7 @@ def _beside_pymavlink(place: pathlib.Path, command: str) -> str:
 def _with_free_ports(place: pathlib.Path, command: str) -> str:
     """The command, and the configurations in the folder, with ports that nobody uses."""
     configurations = {path: path.read_text() for path in (place / "config").glob("*.yaml")}
-    for port in sorted(set(re.findall(r":(145\d\d)\b", command + "".join(configurations.values())))):
+    for port in sorted(set(re.findall(r":(145\d\d|8765)\b", command + "".join(configurations.values())))):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_port:
             any_port.bind(("127.0.0.1", 0))
             free = str(any_port.getsockname()[1])
@@ -264,7 +264,10 @@ def _with_our_devices(place: pathlib.Path, command: list[str]) -> list[str]:
 
 
 def _with_our_key(place: pathlib.Path, command: list[str]) -> list[str]:
-    """The command with a key file that is there."""
+    """The command with a key file, or a token, that is there."""
+    if "--http-token-file" in command:
+        (place / "token").write_text("correct-horse-battery")
+        (place / "token").chmod(0o600)
     if "--signing-key" not in command:
         return command
     (place / "key").write_text(KEY.hex())

@@ -23,11 +23,12 @@ from mav_robot_status.hardware.fields.inhibits import INHIBITS
 from mav_robot_status.hardware.options import HardwareOptions, Within
 from mav_robot_status.interface import DEFAULT_HANDLE_NAME, Detail, RobotStatus
 from mav_robot_status.link.url import KINDS
+from mav_robot_status.publishers import metrics
 from mav_robot_status.publishers.json_lines import native_body
 
 from .documents import DOCUMENTS, ROOT, blocks, prose, table
 
-OTHER_TOOLS = {"--dialect", "--check"}  # options of MAVProxy and ruff
+OTHER_TOOLS = {"--dialect", "--check", "--reference"}  # options of MAVProxy, ruff and chown
 
 
 @pytest.mark.parametrize(
@@ -85,6 +86,20 @@ def test_the_members_of_a_line() -> None:
     body = native_body("", RobotStatus(), Detail())
     members = re.findall(r'"(\w+)": ', re.sub(r"\{[^}]*\}?", "{}", body))
     assert [row[0] for row in table("docs/json.md", "member")] == ["stamp", "seq", *members]
+
+
+@pytest.mark.parametrize(
+    ("of", "families"),
+    [
+        ("of a vehicle", metrics.VEHICLE),
+        ("of a connection", metrics.CONNECTION),
+        ("of a publisher", metrics.PUBLISHER),
+        ("of the gateway", metrics.GATEWAY),
+    ],
+)
+def test_the_metrics_with_their_kinds(of: str, families: tuple[metrics.Family, ...]) -> None:
+    rows = [(name, kind, words) for name, kind, _, words in table("docs/metrics.md", of)]
+    assert rows == [(metrics.PREFIX + family.name, family.kind, family.help) for family in families]
 
 
 def test_the_fields_of_the_readme() -> None:

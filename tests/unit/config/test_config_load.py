@@ -21,6 +21,7 @@ from mav_robot_status.config import (
     describe,
     load,
 )
+from mav_robot_status.errors import ConfigError
 from mav_robot_status.hardware.options import HardwareOptions
 from mav_robot_status.interface import RobotMode
 from mav_robot_status.mavlink.signing import UNSIGNED_IDS
@@ -191,6 +192,23 @@ def test_signing_needs_a_key_and_no_more(tmp_path: Path) -> None:
     assert config.signing == SigningConfig("vehicle.key", "radio_status", 192)
     config = loaded(tmp_path, "signing: {key_file: ~/vehicle.key, accept_unsigned: none, link_id: 0}")
     assert config.signing == SigningConfig("~/vehicle.key", "none", 0)
+
+
+@pytest.mark.parametrize(("text", "path"), [("none", None), ("flight.tlog", "flight.tlog")])
+def test_a_recording_is_a_file_or_none(tmp_path: Path, text: str, path: str | None) -> None:
+    assert loaded(tmp_path, f"record: {text}").record == path
+
+
+@pytest.mark.parametrize("text", ["1", "[a.tlog]", "{}"])
+def test_a_recording_that_is_no_text_is_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ConfigError, match="record must be a text"):
+        loaded(tmp_path, f"record: {text}")
+
+
+@pytest.mark.parametrize(("text", "sent"), [("auto", None), ("true", True), ("false", False)])
+def test_whether_a_link_carries_robot_status_is_yes_no_or_auto(tmp_path: Path, text: str, sent: bool | None) -> None:
+    config = loaded(tmp_path, f"links: [{{url: 'udp:127.0.0.1:14550', robot_status: {text}}}]")
+    assert config.links[0].robot_status is sent
 
 
 def test_without_signing_there_is_none(tmp_path: Path) -> None:

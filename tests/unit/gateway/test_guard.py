@@ -35,6 +35,14 @@ class Faulty:
         self.closed = True
 
 
+@pytest.mark.parametrize(("told", "counted"), [(3, 3), (len, 0), ("many", 0), (None, 0)])
+def test_what_a_publisher_counts_is_handed_on_if_it_is_a_number(told: object, counted: int) -> None:
+    publisher = Faulty(ValueError())
+    publisher.queued = publisher.dropped = told  # type: ignore[attr-defined]
+    guarded = GuardedPublisher(publisher, "mine")
+    assert (guarded.queued, guarded.dropped) == (counted, counted)
+
+
 def test_a_guard_hands_on_what_the_function_returns() -> None:
     assert Guard("x").call(0, max, 3, 4) == 4
 

@@ -110,3 +110,23 @@ def test_whatever_comes_nothing_raises_and_the_ways_stay_few(frames: list[tuple[
         if not heard(paths, frame, str(way), now):
             paths.conflict(frame, str(way))
     assert all(len(path.others) <= MOST_WAYS for path in paths._paths.values())
+
+
+def test_a_vehicle_goes_on_over_the_way_heard_last_of_those_that_stay() -> None:
+    paths: Paths[str] = Paths()
+    heard(paths, beat(), "radio", 0.0)
+    heard(paths, beat(), "cable", 0.1)
+    heard(paths, beat(), "wifi", 0.2)
+    paths.keep(lambda way: way != "radio")
+    assert paths.way(VEHICLE) == "wifi"
+    assert heard(paths, beat(), "wifi", 0.3)
+
+
+def test_a_vehicle_that_was_heard_on_no_way_that_stays_is_forgotten() -> None:
+    paths: Paths[str] = Paths()
+    heard(paths, beat(), "radio", 0.0)
+    heard(paths, beat((2, 1)), "cable", 0.0)
+    heard(paths, beat((2, 1)), "radio", 0.1)
+    paths.keep(lambda way: way == "cable")
+    assert list(paths.vehicles()) == [(2, 1)]
+    assert not paths.counts(beat((2, 1)), "radio", 0.2)

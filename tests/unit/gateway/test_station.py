@@ -8,7 +8,7 @@ import pytest
 
 from mav_robot_status.config import LinkConfig
 from mav_robot_status.gateway.station import MOST_PEERS, MOST_SOURCES, PEER_SILENCE, Station
-from mav_robot_status.mavlink.definitions import Heartbeat
+from mav_robot_status.mavlink.definitions import Heartbeat, NamedValueInt
 from mav_robot_status.mavlink.encode import encode
 
 HEARTBEAT = encode(Heartbeat(0, 10, 3, 65, 4, 3), system=1, component=1, sequence=0)
@@ -103,3 +103,23 @@ def test_a_passive_station_sends_nothing(peer: socket.socket) -> None:
         peer.setblocking(False)
         with pytest.raises(BlockingIOError):
             peer.recv(100)
+
+
+def test_a_link_that_begins_to_pass_frames_on_keeps_its_counters_and_gives_every_frame(station: Station) -> None:
+    unwanted = encode(NamedValueInt(0, 7, b"RS_STATE"), system=1, component=1, sequence=0)
+    assert station.channel("a").parser.feed(HEARTBEAT + unwanted)[1:] == []
+    station.adjust(LinkConfig(station.url), 3, keep_all=True)
+    assert len(station.channel("a").parser.feed(HEARTBEAT + unwanted)) == 2
+    assert station.totals().frames == 4
+    assert station.number == 3
+
+
+def test_a_link_becomes_passive_and_keeps_its_peers(station: Station, peer: socket.socket) -> None:
+    channel = station.channel(peer.getsockname())
+    station.heard(channel, 0.0)
+    station.adjust(LinkConfig(station.url, passive=True), 0)
+    assert not channel.send(HEARTBEAT)
+    station.adjust(LinkConfig(station.url), 0)
+    assert list(station.peers()) == [channel]
+    assert channel.send(HEARTBEAT)
+    assert peer.recv(300) == HEARTBEAT

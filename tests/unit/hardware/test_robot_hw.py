@@ -133,6 +133,51 @@ def test_a_new_segment_begins_as_if_nothing_had_been_heard(caplog: pytest.LogCap
     assert "rebooted" not in caplog.text
 
 
+def test_what_is_not_to_be_kept_is_forgotten_and_the_rest_goes_on() -> None:
+    hw = MavlinkRobotHW()
+    hear(hw, (7, 1), (8, 5))
+    hw.forget(keep={(8, 5)})
+    first, second = (hw.handles.get_handle(name) for name in hw.handles.get_names())
+    assert (first.status, first.detail.link) == (RobotStatus(), LinkState.NEVER_SEEN)
+    assert (second.status.drives_powered, second.detail.link) == (TriState.TRUE, LinkState.CONNECTED)
+    assert hw.deadline < math.inf
+
+
+def test_vehicles_that_are_taken_over_have_their_statuses_at_once_and_go_on() -> None:
+    flight = copter()
+    flight.wait(3)
+    before = flight.vehicle.handle
+    heir = MavlinkRobotHW(HardwareOptions(), [Slot(1, None, "copter")])
+    heir.adopt(flight.hw)
+    handle = heir.handles.get_handle("copter")
+    assert (handle.status, handle.detail, handle.heard_at) == (before.status, before.detail, before.heard_at)
+    heir.read(flight.clock.now())
+    assert (handle.status, handle.detail.vehicle) == (before.status, before.detail.vehicle)
+    late = flight.clock.advance(10.0)
+    heir.read(late)
+    assert handle.detail.link is LinkState.LOST
+
+
+def test_a_vehicle_that_is_taken_over_keeps_the_name_that_it_was_given() -> None:
+    hw, heir, third = MavlinkRobotHW(), MavlinkRobotHW(), MavlinkRobotHW()
+    hear(hw, (7, 1), (8, 5))
+    hw.forget(keep={(8, 5)})
+    heir.adopt(hw)
+    assert heir.handles.get_names() == [f"{NAME}/8.5"]
+    hear(heir, (7, 1))
+    third.adopt(heir)
+    assert third.handles.get_names() == [f"{NAME}/8.5", f"{NAME}/7.1"]
+
+
+def test_a_vehicle_that_nobody_expects_any_more_is_not_taken_over() -> None:
+    hw = MavlinkRobotHW()
+    hear(hw, (7, 1))
+    heir = MavlinkRobotHW(slots=[Slot(8, None, "eight")])
+    heir.adopt(hw)
+    assert list(heir.vehicles) == []
+    assert heir.handles.get_handle("eight").detail.link is LinkState.NEVER_SEEN
+
+
 def test_a_frame_of_mavlink_1_is_heard_like_one_of_mavlink_2() -> None:
     flight = px4(streams=False)
     flight.hw.take(frame_of(BEAT, version=1), flight.clock.now())

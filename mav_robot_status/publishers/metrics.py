@@ -1,0 +1,164 @@
+"""Metrics in Prometheus' text format 0.0.4. Values in, text out; what is not known has no line.
+
+Names follow https://prometheus.io/docs/practices/naming/: base units, `_total` for what only grows. Label values are
+names of ours and of the configuration, never an autopilot's own words, which would make series without end.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from .. import __version__
+from ..interface import LinkState
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+
+    from ..interface import ConnectionMetrics, Metrics, PublisherMetrics, RobotStatusMsg
+
+    Labels = dict[str, object]
+
+CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
+PREFIX: Final = "mav_robot_status_"
+GAUGE, COUNTER = "gauge", "counter"
+
+TRISTATE: Final = "-1 unknown, 0 false, 1 true."
+
+
+class Family(NamedTuple):
+    """One metric: a line for each thing that it is about, or for each of several labels of that thing."""
+
+    name: str
+    kind: str
+    help: str
+    read: Callable[[Any], float | Iterable[tuple[Labels, float]] | None]
+    """The value, None if there is none; or several, each with labels of its own."""
+
+
+def _connected(msg: RobotStatusMsg) -> float:
+    return int(msg.detail.link is LinkState.CONNECTED)
+
+
+def _age(msg: RobotStatusMsg) -> float | None:
+    return None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
+
+
+def _info(msg: RobotStatusMsg) -> Iterable[tuple[Labels, float]]:
+    vehicle = msg.detail.vehicle
+    if vehicle.autopilot is not None:
+        names: Labels = {"autopilot": vehicle.autopilot, "type": vehicle.type or "", "state": vehicle.state or ""}
+        yield {**names, "flight_mode": vehicle.flight_mode or ""}, 1
+
+
+VEHICLE: Final = (
+    Family("link_up", GAUGE, "1 if heartbeats of the vehicle come, 0 if not.", _connected),
+    Family("heartbeat_age_seconds", GAUGE, "Seconds since the last heartbeat of the vehicle.", _age),
+    Family("mode", GAUGE, "Who moves the vehicle: -1 unknown, 1 manual, 2 auto.", lambda m: m.status.mode),
+    Family("e_stopped", GAUGE, TRISTATE, lambda m: m.status.e_stopped),
+    Family("drives_powered", GAUGE, TRISTATE, lambda m: m.status.drives_powered),
+    Family("motion_possible", GAUGE, TRISTATE, lambda m: m.status.motion_possible),
+    Family("in_motion", GAUGE, TRISTATE, lambda m: m.status.in_motion),
+    Family("in_error", GAUGE, TRISTATE, lambda m: m.status.in_error),
+    Family("error_code", GAUGE, "The most important active cause, 0 if there is none.", lambda m: m.status.error_code),
+    Family(
+        "error",
+        GAUGE,
+        "1 for each active cause of in_error.",
+        lambda m: (({"code": e.code, "cause": e.name}, 1) for e in m.detail.errors),
+    ),
+    Family(
+        "inhibit",
+        GAUGE,
+        "1 for each reason why motion is not possible.",
+        lambda m: (({"reason": i.name}, 1) for i in m.detail.inhibits),
+    ),
+    Family("vehicle_info", GAUGE, "1, with what the autopilot says of itself.", _info),
+)
+CONNECTION: Final = (
+    Family("connection_frames_total", COUNTER, "MAVLink frames received that were not damaged.", lambda c: c.frames),
+    Family(
+        "connection_lost_frames_total", COUNTER, "Frames missing from the sequence of their sender.", lambda c: c.lost
+    ),
+    Family(
+        "connection_crc_errors_total",
+        COUNTER,
+        "Frames with a bad CRC by message id: damaged, or defined otherwise; -1: further ids.",
+        lambda c: (({"message_id": message_id}, number) for message_id, number in c.crc_errors.items()),
+    ),
+    Family("connection_unknown_frames_total", COUNTER, "Frames of ids that cannot be checked.", lambda c: c.unknown),
+    Family(
+        "connection_incompatible_frames_total",
+        COUNTER,
+        "Frames with an unknown incompatibility flag.",
+        lambda c: c.incompatible,
+    ),
+    Family("connection_garbage_bytes_total", COUNTER, "Bytes received that are no MAVLink.", lambda c: c.garbage_bytes),
+    Family(
+        "connection_dropped_total",
+        COUNTER,
+        "Messages that could not be sent, and datagrams that the kernel dropped.",
+        lambda c: c.dropped,
+    ),
+    Family("connection_peers", GAUGE, "Ends that are spoken to.", lambda c: c.peers),
+)
+PUBLISHER: Final = (
+    Family("publisher_queued_messages", GAUGE, "Messages held and not yet handed on.", lambda p: p.queued),
+    Family("publisher_dropped_messages_total", COUNTER, "Messages that there was no room for.", lambda p: p.dropped),
+)
+GATEWAY: Final = (
+    Family("build_info", GAUGE, "1, with the version.", lambda m: [({"version": __version__}, 1)]),
+    Family("record_dropped_frames_total", COUNTER, "Frames missing in the recording.", lambda m: m.record_dropped),
+)
+
+
+def exposition(metrics: Metrics) -> str:
+    """The whole text, as `/metrics` gives it."""
+    lines = [
+        *_lines(GATEWAY, [({}, metrics)]),
+        *_lines(VEHICLE, [(_of_vehicle(msg), msg) for msg in metrics.vehicles]),
+        *_lines(CONNECTION, [(_of_connection(one), one) for one in metrics.connections]),
+        *_lines(PUBLISHER, [(_of_publisher(one), one) for one in metrics.publishers]),
+    ]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _lines(families: Iterable[Family], things: list[tuple[Labels, Any]]) -> Iterator[str]:
+    for family in families:
+        yield from _family(family, things)
+
+
+def _of_vehicle(msg: RobotStatusMsg) -> Labels:
+    detail = msg.detail
+    ids = ("" if number is None else number for number in (detail.system, detail.component))
+    return {"handle": msg.handle, **dict(zip(("system", "component"), ids, strict=True))}
+
+
+def _of_connection(one: ConnectionMetrics) -> Labels:
+    return {"connection": one.connection, "role": "out" if one.is_out else "vehicle"}
+
+
+def _of_publisher(one: PublisherMetrics) -> Labels:
+    return {"publisher": one.type, "number": one.number}
+
+
+def _family(family: Family, things: list[tuple[Labels, Any]]) -> list[str]:
+    """Its lines; none if there is no value. Things of the same labels are added up: a series may stand there once."""
+    values: dict[str, float] = {}
+    for labels, thing in things:
+        found = family.read(thing)
+        several = [({}, found)] if isinstance(found, int | float) else found or ()
+        for more, value in several:
+            series = _labels({**labels, **more})
+            values[series] = values.get(series, 0) + value
+    name = PREFIX + family.name
+    head = [f"# HELP {name} {family.help}", f"# TYPE {name} {family.kind}"] if values else []
+    return head + [f"{name}{series} {value:.15g}" for series, value in values.items()]
+
+
+def _labels(labels: Mapping[str, object]) -> str:
+    pairs = ",".join(f'{name}="{_escaped(str(value))}"' for name, value in labels.items())
+    return f"{{{pairs}}}" if pairs else ""
+
+
+def _escaped(text: str) -> str:
+    return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")

@@ -1,0 +1,158 @@
+// The page: what the gateway says, kept here, and shown as the fleet or as one vehicle.
+
+import { Fleet } from "./fleet.js";
+import { Stream } from "./stream.js";
+import { VehiclePage } from "./vehicle.js";
+import { chip, say } from "./make.js";
+import { clock, span } from "./words.js";
+
+const TOKEN = "mav-robot-status token";
+const at = (id) => document.getElementById(id);
+const seconds = () => performance.now() / 1000;
+
+/** The latest of one handle, and when it came. */
+class Vehicle {
+  constructor(line) {
+    this.renew(line);
+  }
+
+  renew(line) {
+    this.line = line;
+    this.beat(line.stamp, line.link?.heartbeat_age ?? null, 0);
+  }
+
+  beat(stamp, heartbeatAge, age) {
+    Object.assign(this, { stamp, heartbeatAge, age, at: seconds() });
+  }
+
+  heardAge() {
+    return this.heartbeatAge === null ? null : this.heartbeatAge + this.age + seconds() - this.at;
+  }
+
+  stale() {
+    return page.staleAfter !== null && this.age + seconds() - this.at > page.staleAfter;
+  }
+}
+
+const page = { vehicles: new Map(), state: "connecting", heardAt: null, heardStamp: null, standing: null, staleAfter: null };
+const fleet = new Fleet();
+const one = new VehiclePage();
+let stream = null;
+
+const on = {
+  event(name, data) {
+    const now = seconds();
+    if (name === "history") return data.handle === one.handle && (one.take(data, now), render());
+    if (name === "explanation") return data.handle === one.handle && one.explain(data);
+    [page.state, page.heardAt, page.heardStamp, page.standing] = ["live", now, data.now, data.standing];
+    if (name === "board") {
+      page.vehicles.clear();
+      page.staleAfter = data.stale_after;
+      say(at("source"), `${data.source}`);
+      at("source").title = `mav-robot-status ${data.version}`;
+    }
+    for (const line of data.vehicles) {
+      const known = page.vehicles.get(line.handle);
+      if (known) known.renew(line);
+      else page.vehicles.set(line.handle, new Vehicle(line));
+    }
+    for (const [handle, beat] of Object.entries(data.beats ?? {})) page.vehicles.get(handle)?.beat(...beat);
+    return render();
+  },
+  lost() {
+    page.state = "lost";
+    render();
+  },
+  denied() {
+    page.state = "denied";
+    at("wrong").hidden = sessionStorage.getItem(TOKEN) === null;
+    sessionStorage.removeItem(TOKEN);
+    render();
+    at("token-field").value = "";
+    at("token-field").focus();
+  },
+};
+
+function ordered() {
+  const key = ({ line }) => [line.system ?? Infinity, line.component ?? 0];
+  return [...page.vehicles.values()].sort((a, b) => {
+    const [x, y] = [key(a), key(b)];
+    return x[0] - y[0] || x[1] - y[1] || (a.line.handle < b.line.handle ? -1 : 1);
+  });
+}
+
+function render() {
+  const denied = page.state === "denied";
+  const vehicle = page.vehicles.get(one.handle);
+  at("token").hidden = !denied;
+  at("fleet").hidden = denied || one.handle !== null || page.heardAt === null;
+  at("vehicle").hidden = denied || one.handle === null || page.heardAt === null;
+  if (one.handle === null) fleet.show(ordered());
+  else if (vehicle) one.show(vehicle);
+  else say(at("who"), "the gateway does not know this vehicle");
+  age();
+}
+
+function age() {
+  const live = page.state === "live" && page.standing === null;
+  document.body.classList.toggle("stale", page.state === "lost" || page.standing !== null);
+  const looks = {
+    live: { shape: "heard", word: "live", tone: "calm" },
+    connecting: { shape: "ring", word: "connecting …", tone: "unknown" },
+    lost: { shape: "lost", word: "NOT CONNECTED", tone: "danger" },
+    denied: { shape: "bar", word: "token needed", tone: "caution" },
+  };
+  const look = page.standing !== null && page.state === "live" ? { ...looks.lost, word: "STANDING STILL" } : looks[page.state];
+  if (at("connection").textContent !== look.word) at("connection").replaceChildren(chip(look));
+  const vehicle = page.vehicles.get(one.handle);
+  if (one.handle === null) fleet.age(page.vehicles.values());
+  else if (vehicle) one.age(vehicle, live, seconds());
+  warn();
+}
+
+function warn() {
+  const banner = at("banner");
+  const lost = page.state === "lost";
+  banner.hidden = !(lost || page.standing !== null) || page.state === "denied";
+  if (banner.hidden) return;
+  const since = page.heardAt === null ? "" : ` since ${clock(page.heardStamp)}, ${span(seconds() - page.heardAt)} ago. All that is shown is from then`;
+  say(banner, lost ? `No connection to the gateway${since}. Trying again.` : `The gateway has not turned for ${span(page.standing)}. What is shown may be old.`);
+}
+
+function route() {
+  let handle = null;
+  try {
+    handle = decodeURIComponent(location.hash.replace(/^#\/?/, "")) || null;
+  } catch {
+    // a broken link leads to the fleet
+  }
+  if (handle?.startsWith("token=")) {
+    sessionStorage.setItem(TOKEN, handle.slice(6));
+    history.replaceState(null, "", "#/");
+    handle = null;
+  }
+  const moved = stream !== null;
+  one.open(handle);
+  connect();
+  render();
+  if (moved) {
+    scrollTo(0, 0);
+    at(handle === null ? "fleet-title" : "vehicle-title").focus({ preventScroll: true });
+  }
+}
+
+function connect() {
+  stream?.close();
+  stream = new Stream(one.handle, sessionStorage.getItem(TOKEN), on);
+}
+
+at("token").addEventListener("submit", (event) => {
+  event.preventDefault();
+  sessionStorage.setItem(TOKEN, at("token-field").value.trim());
+  page.state = "connecting";
+  connect();
+  render();
+});
+addEventListener("hashchange", route);
+setInterval(age, 500);
+route();

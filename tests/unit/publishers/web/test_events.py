@@ -1,0 +1,172 @@
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from mav_robot_status.interface import RobotMode, RobotStatus
+from mav_robot_status.publishers.board import Board
+from mav_robot_status.publishers.web import events
+from mav_robot_status.publishers.web.events import Events, Listener
+from mav_robot_status.testing import ManualClock
+
+from ..port import msg
+
+MANUAL, AUTO = RobotStatus(RobotMode.MANUAL), RobotStatus(RobotMode.AUTO)
+
+
+class Stage:
+    """Events of a board on a clock of the test's."""
+
+    def __init__(self) -> None:
+        self.clock = ManualClock()
+        self.board = Board()
+        self.events = Events(self.board, self.clock.now, lambda: None)
+        self.aborted: list[Listener] = []
+
+    def listener(self, handle: str | None = None) -> Listener:
+        listener = Listener(handle, lambda: self.aborted.append(listener))
+        assert self.events.enter(listener)
+        return listener
+
+    def take(self, status: RobotStatus, handle: str = "robot") -> None:
+        self.board.take(msg(status, handle=handle), self.clock.now().mono)
+
+    def told(self, listener: Listener) -> list[tuple[str, Any]]:
+        return list(parsed(self.events.since(listener)))
+
+
+def parsed(data: bytes) -> Iterator[tuple[str, Any]]:
+    for block in data.decode().split("\n\n")[:-1]:
+        name, text = block.split("\n")
+        yield name.removeprefix("event: "), json.loads(text.removeprefix("data: "))
+
+
+@pytest.fixture
+def stage() -> Stage:
+    return Stage()
+
+
+def test_who_comes_is_told_the_whole_board_and_then_what_changes(stage: Stage) -> None:
+    stage.take(MANUAL, "a")
+    stage.take(MANUAL, "b")
+    listener = stage.listener()
+    [(name, data)] = stage.told(listener)
+    assert name == "board"
+    assert [line["handle"] for line in data["vehicles"]] == ["a", "b"]
+    assert (data["standing"], data["stale_after"]) == (None, None)
+    assert stage.told(listener) == []
+    stage.take(AUTO, "b")
+    [(name, data)] = stage.told(listener)
+    assert (name, [line["handle"] for line in data["vehicles"]]) == ("change", ["b"])
+
+
+def test_a_slow_one_misses_what_was_in_between(stage: Stage) -> None:
+    listener = stage.listener()
+    stage.told(listener)
+    for _ in range(100):
+        stage.take(MANUAL)
+        stage.take(AUTO)
+    [(_, data)] = stage.told(listener)
+    assert [line["mode"] for line in data["vehicles"]] == ["AUTO"]
+
+
+def test_once_a_second_all_are_told_how_old_each_line_is(stage: Stage) -> None:
+    stage.take(MANUAL)
+    listener = stage.listener()
+    stage.events.pulse()
+    stage.told(listener)
+    stage.clock.advance(0.5)
+    stage.events.pulse()
+    assert stage.told(listener) == []
+    stage.clock.advance(0.5)
+    stage.events.pulse()
+    [(_, data)] = stage.told(listener)
+    assert data["vehicles"] == []
+    assert data["beats"] == {"robot": ["1970-01-01T00:00:01.000000Z", 0.1, 1.0]}
+
+
+def test_those_who_keep_up_share_the_same_bytes(stage: Stage) -> None:
+    one, other = stage.listener(), stage.listener()
+    stage.take(MANUAL)
+    stage.events.pulse()
+    assert stage.events.since(one) == stage.events.since(other) != b""
+    assert len(stage.events._cache) == 1
+
+
+def test_who_looks_at_a_vehicle_is_told_its_history_and_then_what_is_new(stage: Stage) -> None:
+    stage.take(MANUAL)
+    stage.clock.advance(5)
+    listener = stage.listener("robot")
+    data = dict(stage.told(listener))["history"]
+    assert (data["whole"], data["known_for"]) == (True, 5.0)
+    assert {"ago": 5.0, "name": "mode", "value": "MANUAL", "before": None}.items() <= data["transitions"][0].items()
+    stage.clock.advance(1)
+    stage.take(AUTO)
+    data = dict(stage.told(listener))["history"]
+    assert (data["whole"], [(t["name"], t["before"]) for t in data["transitions"]]) == (False, [("mode", "MANUAL")])
+    assert "history" not in dict(stage.told(listener))
+
+
+def test_a_vehicle_that_nobody_knows_has_no_history(stage: Stage) -> None:
+    assert [name for name, _ in stage.told(stage.listener("nobody"))] == ["board"]
+
+
+def test_an_explanation_is_told_once_and_only_while_somebody_looks(stage: Stage) -> None:
+    stage.take(MANUAL)
+    listener = stage.listener("robot")
+    stage.told(listener)
+    assert stage.events.watched == {"robot"}
+    stage.events.explain("robot", {"fields": {}})
+    stage.events.explain("other", {"fields": {}})
+    assert stage.told(listener) == [("explanation", {"fields": {}})]
+    assert stage.told(listener) == []
+    stage.events.leave(listener)
+    assert (stage.events.watched, stage.events.explanations) == (frozenset(), {})
+
+
+def test_who_reads_nothing_for_some_seconds_is_cut_off(stage: Stage) -> None:
+    listener = stage.listener()
+    listener.busy_since = stage.clock.now().mono
+    stage.clock.advance(events.PATIENCE)
+    stage.events.pulse()
+    assert not stage.aborted
+    stage.clock.advance(0.1)
+    stage.events.pulse()
+    assert stage.aborted == [listener]
+    assert stage.events.dropped == 1
+
+
+def test_there_are_no_more_listeners_than_are_good(stage: Stage) -> None:
+    for _ in range(events.MOST_LISTENERS):
+        stage.listener()
+    assert not stage.events.enter(Listener(None, lambda: None))
+
+
+def test_news_wake_those_who_wait_and_nothing_does_not(stage: Stage) -> None:
+    async def play() -> list[bool]:
+        waiting = asyncio.ensure_future(stage.events.wait())
+        woken = []
+        for changes in (False, True):
+            if changes:
+                stage.take(MANUAL)
+            await asyncio.sleep(0)
+            stage.events.pulse()
+            await asyncio.sleep(0)
+            await asyncio.sleep(0)
+            woken.append(waiting.done())
+        waiting.cancel()
+        return woken
+
+    stage.clock.advance(1.0)
+    stage.events.pulse()  # the tick is told
+    assert asyncio.run(play()) == [False, True]
+
+
+def test_texts_of_a_vehicle_cannot_end_an_event() -> None:
+    data = events.event("change", {"text": "a\n\ndata: b\r\u2028"})
+    assert data.count(b"\n") == 3
+    assert list(parsed(data)) == [("change", {"text": "a\n\ndata: b\r\u2028"})]

@@ -6,6 +6,7 @@ Deriving a status costs ten times what hearing a message does, and most messages
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
 from ..mavlink import definitions as mav
@@ -159,8 +160,13 @@ PARTS: Final[Mapping[type, Part]] = {
 """All that each of the messages that come several times a second can change, but for times of arrival."""
 
 
-SPEEDS: Final = frozenset({mav.GlobalPositionInt, mav.GpsRawInt, mav.LocalPositionNed, mav.VfrHud})
-"""The messages that may begin a motion, or end one, a while after they were heard."""
+MOTIONS: Final[Mapping[type, Callable[[Memory], motion.Motion]]] = {
+    mav.GlobalPositionInt: attrgetter("motion"),
+    mav.GpsRawInt: attrgetter("gps_motion"),
+    mav.LocalPositionNed: attrgetter("motion"),
+    mav.VfrHud: attrgetter("motion"),
+}
+"""The motion that a message may begin, or end, a while after it was heard."""
 
 
 def matters(memory: Memory, options: HardwareOptions) -> Matters:
@@ -168,19 +174,6 @@ def matters(memory: Memory, options: HardwareOptions) -> Matters:
     found: dict[type | None, tuple[object, ...]] = {kind: part(memory, options) for kind, part in PARTS.items()}
     found[None] = _of_the_rest(memory, options)
     return found
-
-
-def may_matter(memory: Memory, message: object, before: Matters, options: HardwareOptions) -> bool:
-    """Whether `message`, just heard, changed something that matters since `before`."""
-    kind = type(message)
-    if kind in PARTS:
-        return PARTS[kind](memory, options) != before[kind]
-    return matters(memory, options) != before
-
-
-def settles_at(memory: Memory, message: object) -> float:
-    """When (monotonic seconds) a motion begins or ends by a message of SPEEDS if no other comes; infinity: never."""
-    return motion.settles_at(memory.gps_motion if type(message) is mav.GpsRawInt else memory.motion)
 
 
 def next_change(memory: Memory, after: float, options: HardwareOptions) -> float:

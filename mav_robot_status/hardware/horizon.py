@@ -5,7 +5,7 @@ Deriving a status costs ten times what hearing a message does, and most messages
 
 from __future__ import annotations
 
-import math
+from math import inf, nextafter
 from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
@@ -178,26 +178,31 @@ def matters(memory: Memory, options: HardwareOptions) -> Matters:
 
 def next_change(memory: Memory, after: float, options: HardwareOptions) -> float:
     """The first time (monotonic seconds) later than `after` at which the status may change though nothing is heard."""
-    return min((at for at in _ends(memory, after, options) if at > after), default=math.inf)
+    first = inf
+    for at in _ends(memory, after, options):
+        if after < at < first:
+            first = at
+    return first
 
 
 def _ends(memory: Memory, after: float, options: HardwareOptions) -> Iterator[float]:
     """When what was heard becomes too old, latches end, doubts are settled."""
     seen = memory.observation
+    beat, status, mode = seen.heartbeat, seen.sys_status, seen.current_mode
     for heard in seen:
         if heard is None:
             continue
         least = motion.FRESH
-        if heard is seen.heartbeat:
+        if heard is beat:
             least = options.heartbeat_timeout
-        elif heard is seen.sys_status:
+        elif heard is status:
             least = options.sys_status_timeout
-        elif heard is seen.current_mode:
+        elif heard is mode:
             least = CURRENT_MODE_FRESH
-        soon = _after(heard.at + least)
-        yield soon if soon > after or heard is seen.heartbeat else _after(slowly_fresh_until(heard))
+        soon = nextafter(heard.at + least, inf)  # the first time that is later: what is fresh at its limit is not old
+        yield soon if soon > after or heard is beat else nextafter(slowly_fresh_until(heard), inf)
     if memory.watch.at is not None:
-        yield _after(memory.watch.at + motion.FRESH)
+        yield nextafter(memory.watch.at + motion.FRESH, inf)
     if memory.watch.held_since is not None:
         yield memory.watch.held_since + outputs.HOLD
     yield motion.settles_at(memory.motion)
@@ -211,8 +216,3 @@ def _ends(memory: Memory, after: float, options: HardwareOptions) -> Iterator[fl
     if memory.stop.repeats:
         yield memory.stop.last + estop.REPEATED
     yield memory.boot.at + boot.GRACE
-
-
-def _after(at: float) -> float:
-    """The first time that is later: what is fresh at its limit is not behind it."""
-    return math.nextafter(at, math.inf)

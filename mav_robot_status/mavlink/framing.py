@@ -10,6 +10,7 @@ The format: https://mavlink.io/en/guide/serialization.html.
 from __future__ import annotations
 
 import re
+import struct
 from binascii import crc_hqx
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -32,7 +33,6 @@ OTHER_IDS: Final = -1
 
 V1, V2 = 0xFE, 0xFD
 SIGNED = 0x01  # MAVLINK_IFLAG_SIGNED, the only incompatibility flag there is
-OLD = 0x100  # no flag on the wire: stands for "MAVLink 1, which has no flags"
 LATE = 240  # a gap this long is a frame that came up to 16 places late, or twice, rather than 240 lost ones
 HEADER_V1 = Struct("<xBB2sB").unpack_from  # length, sequence, system and component, id
 HEADER_V2 = Struct("<xBBxB2s3s").unpack_from  # length, incompatibility flags, sequence, system and component, id
@@ -167,67 +167,66 @@ class Parser:
         frames: list[Frame] = []
         good = old = 0
         stamped = i = self._stamp_size
+        trailer, limit = 2 + stamped, size + stamped  # the CRC and the next stamp; where they may end
         before = -1
         if not self._in_step:
             i = self._hunt(data, mirrored, min(stamped, size))
             if not self._in_step:
                 self._tail = data[max(0, i - stamped) :]
                 return frames
-        while i < size:
-            magic = data[i]
-            if magic == V2:
-                if i + 10 > size:
-                    break
-                length, flags, sequence, source, wire_id = HEADER_V2(data, i)
-                end = i + 10 + length
-                following = end + 15 if flags & SIGNED else end + 2
-            elif magic == V1:
-                if i + 6 > size:
-                    break
-                length, sequence, source, wire_id = HEADER_V1(data, i)
-                flags = OLD
-                end = i + 6 + length
-                following = end + 2
-            else:
-                i = self._hunt(data, mirrored, i)
-                if self._in_step:
-                    continue
-                break
-            if following > size:
-                break
-            entry = lookup(wire_id)
-            if (
-                entry is None
-                or crc_hqx(mirrored[i + 1 : end], 0xFFFF) ^ entry[0] != back[mirrored[end + 1]] ^ mirrored[end]
-            ):
-                doubtful = i
-                i = self._doubt(data, mirrored, i, following)
-                if self._in_step and i > doubtful:
-                    if keep_all and entry is None and i == following + stamped:
-                        frames.append(_unchecked(data, doubtful, end - length, end, following))
-                    continue
-                break
-            before = i
-            i = following + stamped
-            if expected.get(source) == sequence:
-                expected[source] = (sequence + 1) & 255
-            else:
-                self._gap(source, sequence)
-            if flags:
-                if flags == OLD:
-                    old += 1
-                elif flags == SIGNED:
-                    self.counters.signed += 1
+        try:
+            while i < size:
+                magic = data[i]
+                if magic == V2:
+                    length, flags, sequence, source, wire_id = HEADER_V2(data, i)
+                    end = i + 10 + length
+                    following = end + trailer + 13 if flags & SIGNED else end + trailer
+                elif magic == V1:
+                    length, sequence, source, wire_id = HEADER_V1(data, i)
+                    flags = 0
+                    end = i + 6 + length
+                    following = end + trailer
                 else:
-                    self.counters.incompatible += 1
-                    continue
-            good += 1
-            if entry[2]:
-                payload = data[end - length : end]
-                raw = data[before:following] if keep_all or flags == SIGNED else b""
-                version = 1 if flags == OLD else 2
-                stamp = STAMP(data, before - stamped)[0] if stamped else 0
-                frames.append(new(Frame, (entry[1], source[0], source[1], sequence, payload, raw, version, stamp)))
+                    i = self._hunt(data, mirrored, i)
+                    if self._in_step:
+                        continue
+                    break
+                if following > limit:
+                    break
+                entry = lookup(wire_id)
+                if (
+                    entry is None
+                    or crc_hqx(mirrored[i + 1 : end], 0xFFFF) ^ entry[0] != back[mirrored[end + 1]] ^ mirrored[end]
+                ):
+                    doubtful = i
+                    i = self._doubt(data, mirrored, i, following)
+                    if self._in_step and i > doubtful:
+                        if keep_all and entry is None and i == following:
+                            frames.append(_unchecked(data, doubtful, end - length, end, following - stamped))
+                        continue
+                    break
+                before = i
+                i = following
+                if expected.get(source) == sequence:
+                    expected[source] = (sequence + 1) & 255
+                else:
+                    self._gap(source, sequence)
+                if flags:
+                    if flags != SIGNED:
+                        self.counters.incompatible += 1
+                        continue
+                    self.counters.signed += 1
+                good += 1
+                if magic == V1:
+                    old += 1
+                if entry[2]:
+                    payload = data[end - length : end]
+                    raw = data[before : i - stamped] if keep_all or flags else b""
+                    stamp = STAMP(data, before - stamped)[0] if stamped else 0
+                    version = 1 if magic == V1 else 2
+                    frames.append(new(Frame, (entry[1], source[0], source[1], sequence, payload, raw, version, stamp)))
+        except struct.error:
+            pass  # the data ends within a header
         self._tail = data[i - stamped :]
         if stamped and before >= 0:
             (self.last_stamp,) = STAMP(data, before - stamped)
@@ -251,6 +250,7 @@ class Parser:
     def _doubt(self, data: bytes, mirrored: bytes, i: int, following: int) -> int:
         """Where to go on from a whole frame whose CRC is bad or cannot be checked; `i` itself: wait for more data.
 
+        `following` is where the next frame starts if its length is right.
         The length in a bad frame may be wrong, so a good frame inside it wins. Else both kinds are skipped whole if
         a frame can start behind them; if they end the data while something inside may yet become a frame, more is
         awaited. Else the step is lost.
@@ -261,7 +261,6 @@ class Parser:
         else:
             message_id, sequence, source = data[i + 5], data[i + 2], data[i + 3 : i + 5]
         bad = message_id in CRC_EXTRA
-        following += self._stamp_size
         at_end = following >= len(data)
         inside, open_inside = self._find(data, mirrored, i + 1, following) if bad or at_end else (-1, -1)
         if bad and inside >= 0:

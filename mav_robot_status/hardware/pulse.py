@@ -64,9 +64,7 @@ def next_beat(pulse: Pulse, heartbeat: Heartbeat, now: Instant, connected: bool)
     edge = now if turned or not connected else pulse.edge
     edge_seen = turned or (connected and pulse.edge_seen)
     state_since = now if state != pulse.state else pulse.state_since
-    return new(
-        Pulse, (since, armed, edge, edge_seen, state, state_since, None if state == CRITICAL else calm, runs)
-    )
+    return new(Pulse, (since, armed, edge, edge_seen, state, state_since, None if state == CRITICAL else calm, runs))
 
 
 def armed_before(pulse: Pulse, moment: float, longest: float) -> bool:

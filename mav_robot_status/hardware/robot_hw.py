@@ -149,6 +149,8 @@ class MavlinkRobotHW(RobotHW):
         """The vehicles of which something was taken, since the last `read`, that may change their status."""
         self.deadline = math.inf
         """The first deadline of all vehicles: when `read` has something to do though nothing is stirred."""
+        self.changed = False
+        """Whether a status or a detail in a handle is another; whoever looks puts it back."""
         self._asks_due = math.inf
         self._ask_anew = True
         """Whether `write` may have something to do before that: something has changed since it looked."""
@@ -304,6 +306,7 @@ class MavlinkRobotHW(RobotHW):
             if tracked.memory is None:
                 unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
                 tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
+                self.changed = True
 
     def _overhear(self, frame: Frame, now: Instant) -> None:
         """A command of a ground station to one of the vehicles."""
@@ -373,8 +376,10 @@ class MavlinkRobotHW(RobotHW):
         self._log_link(tracked, derived.detail.link)
         if derived.status != handle.status:
             handle.status = derived.status
+            self.changed = True
         if derived.detail != handle.detail:
             handle.detail = derived.detail
+            self.changed = True
         handle.evidence = derived.evidence
         tracked.dirty = False
         tracked.checked = now.mono

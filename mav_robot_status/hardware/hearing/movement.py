@@ -97,9 +97,7 @@ def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: 
         rebooted(memory, memory.boot, now)
 
 
-def _speed(
-    memory: Memory, x: float, y: float, z: float, still: bool, nowhere: bool = False
-) -> float | None:
+def _speed(memory: Memory, x: float, y: float, z: float, still: bool, nowhere: bool = False) -> float | None:
     """Speed in m/s, None where the numbers mean that there is no estimate: `still` exactly zero, `nowhere` at 0, 0.
 
     ArduPilot sends exactly zero (and its last position) when it has none, and up to 6 m/s at rest while its estimator

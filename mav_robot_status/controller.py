@@ -127,7 +127,10 @@ class IndustrialRobotStatusController:
         return sum(output.skipped for output in self._outputs if output.publisher is publisher)
 
     def next_due(self, now: float) -> float:
-        """The time (monotonic seconds) at which `update` has something to do, if the handle does not change before."""
+        """The time (monotonic seconds) at which `update` has something to do, if the handle does not change before.
+
+        Asked after each `update`; there is none before that time unless the handle changes.
+        """
         due = math.inf
         for output in self._outputs:
             if self.publish_rate > 0 and output.publisher.periodic:
@@ -153,4 +156,4 @@ class IndustrialRobotStatusController:
 
     def _may_change(self, output: _Output, now: float) -> bool:
         changes = output.changes
-        return len(changes) < MOST_CHANGES or now - changes[0] >= WINDOW
+        return len(changes) < MOST_CHANGES or now >= changes[0] + WINDOW

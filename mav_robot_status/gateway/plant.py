@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from ..config import Config
     from ..hardware.robot_hw import Tracked
-    from ..interface import MavlinkPort, Metrics, Publisher
+    from ..interface import Detail, MavlinkPort, Metrics, Publisher, RobotStatus
     from ..mavlink.framing import Frame
 
 NEVER: Final = Instant(0.0, 0)
@@ -74,13 +74,40 @@ def _key(config: PublisherConfig) -> tuple[str, str]:
 class _Post:
     """A controller, under guard, and the handle that it waits for, or publishes."""
 
-    __slots__ = ("controller", "guard", "handle", "running")
+    __slots__ = ("controller", "detail", "due", "guard", "handle", "running", "status", "updated")
 
     def __init__(self, name: str, controller: Any, handle: IndustrialRobotStatusHandle) -> None:
         self.controller = controller
         self.guard = Guard(f"controller '{name}'")
         self.handle = handle
         self.running = False
+        self.updated = 0.0
+        """When the controller was last updated, or started."""
+        self.due = math.inf
+        """What its `next_due` said then."""
+        self.status: RobotStatus | None = None
+        self.detail: Detail | None = None
+        """What was in the handle then."""
+
+    def start(self, now: Instant) -> None:
+        """Start the controller; its first update is due at once."""
+        self.guard.call(None, self.controller.starting, now)
+        self.running, self.updated, self.due = True, now.mono, -math.inf
+
+    def update(self, now: Instant) -> None:
+        """Update the controller if its handle has changed, or what it waits for has come."""
+        status, detail = self.handle.status, self.handle.detail
+        if now.mono < self.due and status is self.status and detail is self.detail:
+            return
+        period, self.updated = now.mono - self.updated, now.mono
+        self.status, self.detail = status, detail
+        self.guard.call(None, self.controller.update, now, period)
+        self.due = self.guard.call(math.inf, self.controller.next_due, now.mono)
+
+    def stop(self, now: Instant) -> None:
+        """Stop the controller."""
+        self.guard.call(None, self.controller.stopping, now)
+        self.running, self.due = False, math.inf
 
 
 class Plant:
@@ -117,6 +144,9 @@ class Plant:
         self.hw.own_system = config.identity.system
         self._controllers = config.controllers or (DEFAULT_CONTROLLER,)
         self._posts: list[_Post] = []
+        self._idle: list[_Post] = []
+        """Those of them that do not run."""
+        self._posts_due = math.inf
         self._named = {slot.handle for slot in slots}
         """Handles that publish from the start, before their vehicle is heard."""
         self._seen: set[str] = set()
@@ -132,6 +162,7 @@ class Plant:
         """
         check(config)
         self.hw.forget(keep)
+        self.hw.changed = True  # for the last status of those that are forgotten
         self.tick(now)
         self._stop(now)
         stay = {_key(p) for c in config.controllers or (DEFAULT_CONTROLLER,) for p in _publishers(c)}
@@ -164,17 +195,13 @@ class Plant:
         return sum(controller.skipped(publisher) for controller in ours)
 
     def tick(self, now: Instant) -> None:
-        """Read the hardware, update the controllers, let the publishers do what waits."""
+        """Read the hardware, update the controllers for which something has changed or is due, let the publishers do
+        what waits."""
         self.hw.read(now)
         self._attend()
-        period = 0.0 if self.now is NEVER else now.mono - self.now.mono
         self.now = now
-        for post in self._posts:
-            if not post.running and self._may_start(post):
-                post.guard.call(None, post.controller.starting, now)
-                post.running = True
-            if post.running:
-                post.guard.call(None, post.controller.update, now, period)
+        if self._idle or self.hw.changed or now.mono >= self._posts_due:
+            self._update(now)
         self._service_due = math.inf
         for publisher in self.publishers.values():
             again = publisher.service(now)
@@ -186,13 +213,9 @@ class Plant:
 
         `until` is handed to the hardware, see there.
         """
-        due = min(self.hw.next_due(until), self._service_due)
-        for post in self._posts:
-            if post.running:
-                due = min(due, post.guard.call(math.inf, post.controller.next_due, now))
-            elif self._may_start(post):
-                return now
-        return due
+        if self.hw.changed or any(map(self._may_start, self._idle)):
+            return now
+        return min(self.hw.next_due(until), self._service_due, self._posts_due)
 
     def forget(self, now: Instant) -> None:
         """Begin anew with what is heard, as at the start."""
@@ -214,8 +237,18 @@ class Plant:
     def _stop(self, now: Instant) -> None:
         for post in self._posts:
             if post.running:
-                post.guard.call(None, post.controller.stopping, now)
-                post.running = False
+                post.stop(now)
+        self._idle, self._posts_due = list(self._posts), math.inf
+
+    def _update(self, now: Instant) -> None:
+        self.hw.changed = False
+        for post in filter(self._may_start, self._idle):
+            post.start(now)
+        self._idle = [post for post in self._idle if not post.running]
+        for post in self._posts:
+            if post.running:
+                post.update(now)
+        self._posts_due = min((post.due for post in self._posts), default=math.inf)
 
     def _may_start(self, post: _Post) -> bool:
         return post.handle.name in self._named or post.handle.detail.link is not LinkState.NEVER_SEEN
@@ -243,6 +276,7 @@ class Plant:
             controller = make()
             controller.init(self.hw, config.parameters, publishers)
             self._posts.append(_Post(config.name, controller, controller.handle))
+            self._idle.append(self._posts[-1])
 
     def _publishers(self, config: ControllerConfig) -> list[Publisher]:
         """The publishers of a controller; on replay without those for the living."""

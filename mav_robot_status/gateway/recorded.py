@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
 from ..hardware.robot_hw import WANTED_IDS
-from ..link.log import END, STAMP_SIZE, Counts, LogReader, stamp_of, timed
-from ..mavlink.framing import Frame, Parser
+from ..link.log import Counts, LogReader, timed
+from ..mavlink.framing import Parser
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from ..link.log import Piece, Stamped
+    from ..link.log import Stamped
+    from ..mavlink.framing import Frame
 
 
 class Recording:
@@ -21,13 +23,16 @@ class Recording:
     def __init__(self, path: str) -> None:
         """Read the file. Raises UsageError if it cannot be read."""
         self._reader = LogReader(path)
-        self._parser = Parser(WANTED_IDS, STAMP_SIZE)
-        self._torn = 0
+        self._parser = Parser(WANTED_IDS, stamped=True)
         self.counts = Counts()
 
     def __iter__(self) -> Iterator[Stamped]:
         """Raises UsageError at the end if there was nothing in it that is MAVLink."""
-        yield from timed(self._pieces(), self.counts)
+        return timed(chain.from_iterable(self._frames()), lambda: self._parser.last_stamp, self.counts)
+
+    def _frames(self) -> Iterator[list[Frame]]:
+        for block in self._reader.blocks():
+            yield self._parser.feed(block)
         counters = self._parser.counters
         if not counters.frames and not counters.unknown:
             raise UsageError(
@@ -49,26 +54,10 @@ class Recording:
             (sum(counters.unknown.values()), "of unknown kind"),
             (counters.incompatible, "with incompatible flags"),
             (counters.garbage_bytes, "bytes of garbage"),
-            (self._torn, "bytes of a torn record at the end"),
+            (self._parser.pending, "bytes of a torn record at the end"),
             (self.counts.corrected, "wrong time stamps corrected"),
             (self.counts.held, "stamps held while the clock was stepped back"),
             (self.counts.jumps, "jumps of the clock, each a new segment"),
         )
         total = f"{self._reader.path}: {counters.frames} frames"
         return ", ".join([total, *(f"{number} {what}" for number, what in found if number)])
-
-    def _pieces(self) -> Iterator[Piece[Frame | None]]:
-        """Each wanted frame with its stamp and the next one's; None with the stamp of the very last frame."""
-        frame: Frame | None = None
-        stamp = 0
-        for block in self._reader.blocks():
-            for following in self._parser.feed(block):
-                next_stamp = stamp_of(following.stamp, stamp)
-                if frame is not None:
-                    yield stamp, next_stamp, frame
-                frame, stamp = following, next_stamp
-        self._torn = self._parser.pending
-        if frame is not None:
-            last = stamp_of(self._parser.last_stamp, stamp)
-            yield stamp, last, frame
-            yield last, END, None

@@ -55,13 +55,13 @@ def replay(config: Config, path: str, stdout: TextIO) -> None:
 def run_through(plant: Plant, recording: Iterable[Stamped]) -> Instant:
     """Feed a recording to the plant; gives the last instant of it. The plant has lived what came before the next."""
     hw = plant.hw
-    last: Instant | None = None
+    last = NEVER
     due = math.inf
     for now, frame, new_segment in recording:
         mono = now.mono
-        if last is not None and new_segment:
+        if new_segment:
             plant.forget(last)
-        elif last is not None and (due < mono or hw.deadline < mono):
+        elif due < mono or hw.deadline < mono:
             if plant.next_due(last.mono, mono) < mono:
                 live_through(plant, last, now)
             due = plant.next_due(mono)
@@ -71,7 +71,7 @@ def run_through(plant: Plant, recording: Iterable[Stamped]) -> Instant:
                 plant.tick(now)
                 due = plant.next_due(mono)
         last = now
-    return NEVER if last is None else last
+    return last
 
 
 def live_through(plant: Plant, last: Instant, until: Instant) -> None:

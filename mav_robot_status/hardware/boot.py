@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 STEP_BACK_MS: Final = 2000
+STEP_BACK: Final = STEP_BACK_MS / 1000  # seconds
 WRAP: Final = 1 << 32
 GRACE: Final = 10.0
 """Seconds after boot during which sensor bits raise no error."""
@@ -33,12 +34,14 @@ class Boot:
 def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> bool:
     """One more sample; whether it shows a reboot."""
     booted = now - time_boot_ms / 1000
-    step = 1 if boot.clock_ms is None else _difference(time_boot_ms, boot.clock_ms)
+    clock_ms = boot.clock_ms
+    step = 1 if clock_ms is None else _difference(time_boot_ms, clock_ms)
     if step > 0:
         # on its way a sample is only ever held up, so the earliest boot is the truest; after 49 days the clock wraps
-        if boot.clock_ms is None or not 0 <= booted - boot.at < STEP_BACK_MS / 1000:
+        if clock_ms is None or not 0 <= booted - boot.at < STEP_BACK:
             boot.at = booted
-        boot.clock_ms, boot.doubt_ms = time_boot_ms, None
+        boot.clock_ms = time_boot_ms
+        boot.doubt_ms = None
         return False
     if step >= -STEP_BACK_MS:
         boot.doubt_ms = None

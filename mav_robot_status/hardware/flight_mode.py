@@ -77,7 +77,7 @@ def flight_mode(heartbeat: Heartbeat, stack: Stack, family: Family, sources: Mod
 def is_initialising(heartbeat: Heartbeat, stack: Stack, family: Family) -> bool:
     """True while an ArduPilot says in its mode that it is still starting."""
     return (
-        stack is Stack.ARDUPILOT and family in INITIALISING_FAMILIES and heartbeat.custom_mode == ardupilot.INITIALISING
+        heartbeat.custom_mode == ardupilot.INITIALISING and stack is Stack.ARDUPILOT and family in INITIALISING_FAMILIES
     )
 
 

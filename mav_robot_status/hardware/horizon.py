@@ -5,7 +5,8 @@ Deriving a status costs ten times what hearing a message does, and most messages
 
 from __future__ import annotations
 
-import math
+from math import inf, nextafter
+from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
 from ..mavlink import definitions as mav
@@ -159,8 +160,13 @@ PARTS: Final[Mapping[type, Part]] = {
 """All that each of the messages that come several times a second can change, but for times of arrival."""
 
 
-SPEEDS: Final = frozenset({mav.GlobalPositionInt, mav.GpsRawInt, mav.LocalPositionNed, mav.VfrHud})
-"""The messages that may begin a motion, or end one, a while after they were heard."""
+MOTIONS: Final[Mapping[type, Callable[[Memory], motion.Motion]]] = {
+    mav.GlobalPositionInt: attrgetter("motion"),
+    mav.GpsRawInt: attrgetter("gps_motion"),
+    mav.LocalPositionNed: attrgetter("motion"),
+    mav.VfrHud: attrgetter("motion"),
+}
+"""The motion that a message may begin, or end, a while after it was heard."""
 
 
 def matters(memory: Memory, options: HardwareOptions) -> Matters:
@@ -170,41 +176,33 @@ def matters(memory: Memory, options: HardwareOptions) -> Matters:
     return found
 
 
-def may_matter(memory: Memory, message: object, before: Matters, options: HardwareOptions) -> bool:
-    """Whether `message`, just heard, changed something that matters since `before`."""
-    kind = type(message)
-    if kind in PARTS:
-        return PARTS[kind](memory, options) != before[kind]
-    return matters(memory, options) != before
-
-
-def settles_at(memory: Memory, message: object) -> float:
-    """When (monotonic seconds) a motion begins or ends by a message of SPEEDS if no other comes; infinity: never."""
-    return motion.settles_at(memory.gps_motion if type(message) is mav.GpsRawInt else memory.motion)
-
-
 def next_change(memory: Memory, after: float, options: HardwareOptions) -> float:
     """The first time (monotonic seconds) later than `after` at which the status may change though nothing is heard."""
-    return min((at for at in _ends(memory, after, options) if at > after), default=math.inf)
+    first = inf
+    for at in _ends(memory, after, options):
+        if after < at < first:
+            first = at
+    return first
 
 
 def _ends(memory: Memory, after: float, options: HardwareOptions) -> Iterator[float]:
     """When what was heard becomes too old, latches end, doubts are settled."""
     seen = memory.observation
+    beat, status, mode = seen.heartbeat, seen.sys_status, seen.current_mode
     for heard in seen:
         if heard is None:
             continue
         least = motion.FRESH
-        if heard is seen.heartbeat:
+        if heard is beat:
             least = options.heartbeat_timeout
-        elif heard is seen.sys_status:
+        elif heard is status:
             least = options.sys_status_timeout
-        elif heard is seen.current_mode:
+        elif heard is mode:
             least = CURRENT_MODE_FRESH
-        soon = _after(heard.at + least)
-        yield soon if soon > after or heard is seen.heartbeat else _after(slowly_fresh_until(heard))
+        soon = nextafter(heard.at + least, inf)  # the first time that is later: what is fresh at its limit is not old
+        yield soon if soon > after or heard is beat else nextafter(slowly_fresh_until(heard), inf)
     if memory.watch.at is not None:
-        yield _after(memory.watch.at + motion.FRESH)
+        yield nextafter(memory.watch.at + motion.FRESH, inf)
     if memory.watch.held_since is not None:
         yield memory.watch.held_since + outputs.HOLD
     yield motion.settles_at(memory.motion)
@@ -218,8 +216,3 @@ def _ends(memory: Memory, after: float, options: HardwareOptions) -> Iterator[fl
     if memory.stop.repeats:
         yield memory.stop.last + estop.REPEATED
     yield memory.boot.at + boot.GRACE
-
-
-def _after(at: float) -> float:
-    """The first time that is later: what is fresh at its limit is not behind it."""
-    return math.nextafter(at, math.inf)

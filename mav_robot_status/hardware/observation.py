@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -83,4 +84,7 @@ class Observation:
 
     def __iter__(self) -> Iterator[Heard | None]:
         """All of them."""
-        return (getattr(self, name) for name in self.__slots__)
+        return iter(_ALL(self))
+
+
+_ALL = attrgetter(*Observation.__slots__)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 CRITICAL: Final = 5  # MAV_STATE
 TERMINATED: Final = 8
 RUNS: Final = 6
+new: Final = tuple.__new__  # as in `framing`
 
 
 class Run(NamedTuple):
@@ -54,21 +55,16 @@ def next_beat(pulse: Pulse, heartbeat: Heartbeat, now: Instant, connected: bool)
     state = heartbeat.system_status
     last = pulse.runs[-1]
     if armed == last.armed:
-        runs = (*pulse.runs[:-1], last._replace(last=now.mono))
+        runs = (*pulse.runs[:-1], new(Run, (armed, last.first, now.mono)))
     else:
         runs = (*pulse.runs[-RUNS + 1 :], Run(armed, now.mono, now.mono))
     calm = pulse.calm_since if pulse.calm_since is not None else now.mono
     turned = armed != pulse.armed
-    return Pulse(
-        since=pulse.since if connected else now,
-        armed=armed,
-        edge=now if turned or not connected else pulse.edge,
-        edge_seen=turned or (connected and pulse.edge_seen),
-        state=state,
-        state_since=now if state != pulse.state else pulse.state_since,
-        calm_since=None if state == CRITICAL else calm,
-        runs=runs,
-    )
+    since = pulse.since if connected else now
+    edge = now if turned or not connected else pulse.edge
+    edge_seen = turned or (connected and pulse.edge_seen)
+    state_since = now if state != pulse.state else pulse.state_since
+    return new(Pulse, (since, armed, edge, edge_seen, state, state_since, None if state == CRITICAL else calm, runs))
 
 
 def armed_before(pulse: Pulse, moment: float, longest: float) -> bool:

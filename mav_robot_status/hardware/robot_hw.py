@@ -21,11 +21,11 @@ from ..interface import (
 )
 from ..mavlink import definitions as mav
 from ..mavlink.decode import decode, text
-from . import causes, horizon
+from . import causes, horizon, motion
 from .derive import derive
 from .fields.inhibits import inhibit
 from .fields.view import named
-from .hearing import HANDLERS, hear, overheard, pass_time
+from .hearing import HANDLERS, overheard, pass_time
 from .identity import is_autopilot
 from .memory import begin
 from .observation import SILENCE
@@ -34,11 +34,12 @@ from .parameters import Parameters
 from .requests import OUTPUT_WATCH, Requests, wanted_of
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterator, Sequence
+    from collections.abc import Callable, Container, Iterator, Sequence
 
     from ..clock import Instant
     from ..mavlink.framing import Frame
-    from .horizon import Matters
+    from .hearing import Handler
+    from .horizon import Matters, Part
     from .memory import Memory
 
 log = logging.getLogger(__name__)
@@ -47,6 +48,24 @@ MOST_VEHICLES: Final = 256
 HEARTBEAT_ID: Final = 0
 COMMAND_IDS: Final = frozenset({75, 76})  # COMMAND_INT, COMMAND_LONG: heard from others
 WANTED_IDS: Final = frozenset(d.id for d in mav.MESSAGES.values() if d.type in HANDLERS) | COMMAND_IDS
+
+
+class Kind(NamedTuple):
+    """How the messages of one type are heard."""
+
+    type: type
+    handler: Handler
+    part: Part | None
+    """What it can change of all that matters; None: anything."""
+    motion: Callable[[Memory], motion.Motion] | None
+    """What it may begin or end a while later."""
+
+
+KINDS: Final = {
+    d.id: Kind(d.type, HANDLERS[d.type], horizon.PARTS.get(d.type), horizon.MOTIONS.get(d.type))
+    for d in mav.MESSAGES.values()
+    if d.type in HANDLERS
+}
 
 
 class Slot(NamedTuple):
@@ -133,6 +152,8 @@ class MavlinkRobotHW(RobotHW):
         """The vehicles of which something was taken, since the last `read`, that may change their status."""
         self.deadline = math.inf
         """The first deadline of all vehicles: when `read` has something to do though nothing is stirred."""
+        self.changed = False
+        """Whether a status or a detail in a handle is another; whoever looks puts it back."""
         self._asks_due = math.inf
         self._ask_anew = True
         """Whether `write` may have something to do before that: something has changed since it looked."""
@@ -155,18 +176,44 @@ class MavlinkRobotHW(RobotHW):
 
     def take(self, frame: Frame, now: Instant) -> Tracked | None:
         """Take one frame. Returns the vehicle whose autopilot's heartbeat it is, None for everything else."""
+        message_id = frame.message_id
+        kind = KINDS.get(message_id)
+        if kind is None:
+            if message_id in COMMAND_IDS:
+                self._overhear(frame, now)
+            return None
         tracked = self._tracked.get((frame.system, frame.component))
-        kind = frame.message_id
-        if kind == HEARTBEAT_ID:
-            return self._take_heartbeat(tracked, frame, now)
-        if kind in COMMAND_IDS:
-            self._overhear(frame, now)
-        elif tracked is not None and tracked.memory is not None:
-            message = decode(frame)
-            if tracked.requests is not None:
-                self._tell_askers(tracked, tracked.requests, message, kind, now)
-            self._hear(tracked, tracked.memory, message, now)
-        return None
+        message = decode(frame)
+        beating = None
+        if message_id == HEARTBEAT_ID:
+            tracked = beating = self._beating(tracked, message, frame, now)
+        if tracked is None:
+            return None
+        memory = tracked.memory
+        if memory is None:
+            if beating is not None:
+                tracked.memory = begin(message, now)
+                self._stir(tracked)
+            return beating
+        if beating is None and tracked.requests is not None:
+            self._tell_askers(tracked, tracked.requests, message, message_id, now)
+        type_, handler, part, moving = kind
+        options = self.options
+        handler(memory, message, now, options)
+        if tracked.dirty:
+            return beating
+        if self._hasty or (
+            part(memory, options) != tracked.seen[type_]
+            if part is not None
+            else horizon.matters(memory, options) != tracked.seen
+        ):
+            self._stir(tracked)
+        elif moving is not None:
+            at = motion.settles_at(moving(memory))
+            if now.mono < at < tracked.deadline:
+                tracked.deadline = at
+                self.deadline = min(self.deadline, at)
+        return beating
 
     def is_stirred(self, asks: bool) -> bool:
         """Whether something was taken that `read`, or `write` if it is called at all, should look at now."""
@@ -288,6 +335,7 @@ class MavlinkRobotHW(RobotHW):
             if tracked.memory is None:
                 unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
                 tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
+                self.changed = True
 
     def _overhear(self, frame: Frame, now: Instant) -> None:
         """A command of a ground station to one of the vehicles."""
@@ -297,21 +345,14 @@ class MavlinkRobotHW(RobotHW):
             if addressed and tracked.memory is not None:
                 overheard(tracked.memory, message, (frame.system, frame.component), now)
 
-    def _take_heartbeat(self, tracked: Tracked | None, frame: Frame, now: Instant) -> Tracked | None:
-        """The vehicle, if it is an autopilot's heartbeat."""
-        heartbeat = decode(frame)
+    def _beating(self, tracked: Tracked | None, heartbeat: mav.Heartbeat, frame: Frame, now: Instant) -> Tracked | None:
+        """The vehicle whose autopilot sent this heartbeat, if any did."""
         if tracked is None:
             tracked = self._discover(heartbeat, (frame.system, frame.component), now)
         elif not is_autopilot(heartbeat, frame.component):
             return None
-        if tracked is None:
-            return None
-        tracked.handle.heard_at = now.mono
-        if tracked.memory is None:
-            tracked.memory = begin(heartbeat, now)
-            self._stir(tracked)
-        else:
-            self._hear(tracked, tracked.memory, heartbeat, now)
+        if tracked is not None:
+            tracked.handle.heard_at = now.mono
         return tracked
 
     def _tell_askers(self, tracked: Tracked, requests: Requests, message: Any, kind: int, now: Instant) -> None:
@@ -348,19 +389,6 @@ class MavlinkRobotHW(RobotHW):
             self._tracked[ids] = tracked
         return tracked
 
-    def _hear(self, tracked: Tracked, memory: Memory, message: Any, now: Instant) -> None:
-        options = self.options
-        hear(memory, message, now, options)
-        if tracked.dirty:
-            return
-        if self._hasty or horizon.may_matter(memory, message, tracked.seen, options):
-            self._stir(tracked)
-        elif type(message) in horizon.SPEEDS:
-            at = horizon.settles_at(memory, message)
-            if now.mono < at < tracked.deadline:
-                tracked.deadline = at
-                self.deadline = min(self.deadline, at)
-
     def _stir(self, tracked: Tracked) -> None:
         tracked.dirty = True
         self.stirred.append(tracked)
@@ -384,8 +412,10 @@ class MavlinkRobotHW(RobotHW):
         self._log_link(tracked, derived.detail.link)
         if derived.status != handle.status:
             handle.status = derived.status
+            self.changed = True
         if derived.detail != handle.detail:
             handle.detail = derived.detail
+            self.changed = True
         handle.evidence = derived.evidence
         tracked.dirty = False
         tracked.checked = now.mono

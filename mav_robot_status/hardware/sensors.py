@@ -97,13 +97,11 @@ def heard_faults(faults: Faults, mask: int, now: Instant) -> Faults:
     if not mask:
         return NO_FAULTS
     after = {}
-    bit = 0
     while mask:
-        if mask & 1:
-            before = faults.get(bit)
-            after[bit] = Fault(before.since, before.messages + 1) if before else Fault(now, 1)
-        mask >>= 1
-        bit += 1
+        bit = (mask & -mask).bit_length() - 1  # the lowest
+        before = faults.get(bit)
+        after[bit] = Fault(before.since, before.messages + 1) if before else Fault(now, 1)
+        mask &= mask - 1
     return after
 
 

@@ -6,10 +6,9 @@ were stamped by computers whose clock was set during the flight.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from struct import Struct
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, Protocol
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import UsageError
@@ -23,11 +22,6 @@ DAY_US = 86_400_000_000
 _LATEST = 1 << 51  # microseconds, in 2041
 BLOCK = 1 << 16
 """Bytes handed on at once."""
-STAMP_SIZE = 8
-"""Bytes of time stamp before each frame."""
-STAMP = Struct(">Q").unpack
-
-T = TypeVar("T")
 
 new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
 
@@ -54,36 +48,83 @@ class Stamped(NamedTuple):
     """True where the log's clock has jumped for good: what was known before is of another time."""
 
 
-Piece = tuple[int, int, T]
-"""Something with its stamp, and the stamp of what comes next (END if nothing does), microseconds since 1970."""
+class _Record(Protocol):
+    """Something in a log."""
+
+    @property
+    def stamp(self) -> int:
+        """Microseconds since 1970, as the log says."""
+
+
 END = -1
+"""In place of the stamp behind the end of a log."""
 _NEVER = -(1 << 63)
 
 
-def timed(pieces: Iterable[Piece[T]], counts: Counts) -> Iterator[Stamped]:
-    """Say when each piece was heard, by the rules for a log's clock. Pure but for `counts`."""
-    latest = segment = _NEVER  # the stamp that time has reached; the one at which the segment started
-    mono = 0.0  # where the segment started
-    jumped = False
-    for stamp, following, what in pieces:
+def timed(records: Iterable[_Record], last: Callable[[], int], counts: Counts) -> Iterator[Stamped]:
+    """Say when each record was heard, and then, with None, when the log ended; nothing of a log without records.
+
+    `last` gives the stamp at the end of the log once all records were read.
+    """
+    clock = _Clock(counts)
+    latest, limit, segment, mono = clock.state()
+    stamp = 0
+    record: _Record | None = None
+    for following in records:
+        next_stamp = following.stamp
         # Nearly every record is neither before the last one nor after the next one.
-        if not (latest <= stamp <= following and stamp - latest <= DAY_US):
-            if latest == _NEVER:
-                latest = segment = stamp
-            elif _is_jump(latest, stamp, following):
-                counts.jumps += 1
-                jumped = True
-                mono += (latest - segment) * 1e-6
-                latest = segment = stamp
-            elif _is_outlier(latest, stamp, following):
-                counts.corrected += 1
-                stamp = latest
-            elif stamp < latest:
-                counts.held += 1
-                stamp = latest
-        latest = stamp
-        yield new(Stamped, (new(Instant, (mono + (stamp - segment) * 1e-6, stamp)), what, jumped))
+        if latest <= stamp <= next_stamp and stamp <= limit:
+            latest = stamp
+            yield new(Stamped, (new(Instant, (mono + (stamp - segment) * 1e-6, stamp)), record, False))
+        elif record is not None:
+            clock.latest = latest
+            yield clock.stamped(record, stamp, next_stamp)
+            latest, limit, segment, mono = clock.state()
+        record, stamp = following, next_stamp
+    if record is not None:
+        clock.latest = latest
+        yield clock.stamped(record, stamp, last())
+        yield clock.stamped(None, last(), END)
+
+
+class _Clock:
+    """The rules for a log's clock."""
+
+    __slots__ = ("_counts", "latest", "mono", "segment")
+
+    def __init__(self, counts: Counts) -> None:
+        self._counts = counts
+        self.latest = self.segment = _NEVER
+        """The stamp that time has reached; the one at which the segment started."""
+        self.mono = 0.0
+        """Where the segment started."""
+
+    def state(self) -> tuple[int, int, int, float]:
+        """The stamp that time has reached, the last one that may follow it, the segment's first, and where that is."""
+        limit = _NEVER if self.latest == _NEVER else self.latest + DAY_US
+        return self.latest, limit, self.segment, self.mono
+
+    def stamped(self, what: Any, stamp: int, following: int) -> Stamped:
+        """When something was heard, by its stamp and the one `following` it."""
+        latest = self.latest
         jumped = False
+        if latest == _NEVER:
+            self.segment = stamp
+        elif latest <= stamp <= following and stamp - latest <= DAY_US:
+            pass
+        elif _is_jump(latest, stamp, following):
+            self._counts.jumps += 1
+            jumped = True
+            self.mono += (latest - self.segment) * 1e-6
+            self.segment = stamp
+        elif _is_outlier(latest, stamp, following):
+            self._counts.corrected += 1
+            stamp = latest
+        elif stamp < latest:
+            self._counts.held += 1
+            stamp = latest
+        self.latest = stamp
+        return Stamped(Instant(self.mono + (stamp - self.segment) * 1e-6, stamp), what, jumped)
 
 
 def follows(earlier: int, later: int) -> bool:
@@ -99,14 +140,6 @@ def _is_jump(latest: int, stamp: int, following: int) -> bool:
 def _is_outlier(latest: int, stamp: int, following: int) -> bool:
     """Whether a stamp that is no jump stands alone: it does not go on from `latest`, or the next one does instead."""
     return not follows(latest, stamp) or (not follows(stamp, following) and follows(latest, following))
-
-
-def stamp_of(raw: bytes, otherwise: int) -> int:
-    """The stamp in front of a frame, whatever it says; `otherwise` if the log begins in the middle of it."""
-    if len(raw) != STAMP_SIZE:
-        return otherwise
-    (stamp,) = STAMP(raw)
-    return stamp  # type: ignore[no-any-return]
 
 
 class LogReader:

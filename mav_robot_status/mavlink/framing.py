@@ -10,6 +10,7 @@ The format: https://mavlink.io/en/guide/serialization.html.
 from __future__ import annotations
 
 import re
+import struct
 from binascii import crc_hqx
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -32,17 +33,21 @@ OTHER_IDS: Final = -1
 
 V1, V2 = 0xFE, 0xFD
 SIGNED = 0x01  # MAVLINK_IFLAG_SIGNED, the only incompatibility flag there is
-OLD = 0x100  # no flag on the wire: stands for "MAVLink 1, which has no flags"
 LATE = 240  # a gap this long is a frame that came up to 16 places late, or twice, rather than 240 lost ones
 HEADER_V1 = Struct("<xBB2sB").unpack_from  # length, sequence, system and component, id
 HEADER_V2 = Struct("<xBBxB2s3s").unpack_from  # length, incompatibility flags, sequence, system and component, id
-CRC = Struct(">H").unpack_from  # of mirrored bytes
+STAMP = Struct(">Q").unpack_from  # microseconds since 1970
+STAMP_SIZE: Final = 8
 MAGIC = re.compile(b"[\xfd\xfe]")
 VALID, OPEN, WRONG = range(3)
 new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
 
 # MAVLink's CRC-16/MCRF4XX is the standard library's crc_hqx on bytes whose bits are mirrored.
 MIRROR: Final = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+_STEPS: Final = {step & 255: high << 8 | step >> 8 for high in range(256) for step in (crc_hqx(bytes((high,)), 0),)}
+BACK: Final = tuple(_STEPS[low] for low in range(256))
+"""Undoes the last byte of a CRC, which is CRC_EXTRA and does not stand in the frame: looking up two bytes is quicker
+than adding that one. `before(extra) == BACK[crc & 255] ^ crc >> 8 ^ extra << 8`."""
 
 
 class Frame(NamedTuple):
@@ -57,8 +62,8 @@ class Frame(NamedTuple):
     """The whole frame as received, if it is signed (not verified) or the parser keeps everything; else b""."""
     version: int
     """1 or 2."""
-    stamp: bytes = b""
-    """What stands before the frame where frames are stamped (a recorded log), else b""."""
+    stamp: int = 0
+    """Microseconds since 1970, where frames are stamped (a recorded log)."""
 
 
 @dataclass(slots=True)
@@ -103,11 +108,12 @@ def count(table: dict[int, int], message_id: int, number: int = 1) -> None:
 
 
 @lru_cache(maxsize=8)
-def known_ids(wanted: frozenset[int]) -> dict[bytes | int, tuple[bytes, int, bool]]:
-    """Mirrored CRC_EXTRA, id, whether it is wanted; by the id as it stands in the frame (MAVLink 2: three bytes)."""
-    known: dict[bytes | int, tuple[bytes, int, bool]] = {}
+def known_ids(wanted: frozenset[int]) -> dict[bytes | int, tuple[int, int, bool]]:
+    """What CRC_EXTRA does to a CRC, id, whether it is wanted; by the id as it stands in the frame (MAVLink 2: three
+    bytes)."""
+    known: dict[bytes | int, tuple[int, int, bool]] = {}
     for message_id, crc_extra in CRC_EXTRA.items():
-        entry = MIRROR[crc_extra : crc_extra + 1], message_id, message_id in wanted
+        entry = MIRROR[crc_extra] << 8, message_id, message_id in wanted
         known[message_id.to_bytes(3, "little")] = known[message_id] = entry
     return known
 
@@ -117,15 +123,15 @@ class Parser:
 
     `wanted` are the message ids that `feed` returns; frames of other ids are checked and counted, no more. None: every
     frame is returned with its `raw` bytes, also those of unknown ids, which cannot be checked (to pass them on).
-    `stamp_size` bytes stand before each frame (8 in a recorded log) that are no MAVLink and are handed on with it.
+    If it is `stamped`, each frame has its time before it, as in a recorded log.
     """
 
     __slots__ = ("_expected", "_in_step", "_keep_all", "_lookup", "_stamp_size", "_tail", "counters", "last_stamp")
 
-    def __init__(self, wanted: Collection[int] | None, stamp_size: int = 0) -> None:
+    def __init__(self, wanted: Collection[int] | None, stamped: bool = False) -> None:
         self.counters = Counters()
-        self._stamp_size = stamp_size
-        self.last_stamp = b""
+        self._stamp_size = STAMP_SIZE if stamped else 0
+        self.last_stamp = 0
         """The stamp of the last good frame, wanted or not, where frames are stamped."""
         self._tail = b""
         self._in_step = True
@@ -156,72 +162,74 @@ class Parser:
         mirrored = data.translate(MIRROR)
         lookup = self._lookup
         expected = self._expected
+        back = BACK
         keep_all = self._keep_all
         frames: list[Frame] = []
         good = old = 0
         stamped = i = self._stamp_size
+        trailer, limit = 2 + stamped, size + stamped  # the CRC and the next stamp; where they may end
         before = -1
         if not self._in_step:
             i = self._hunt(data, mirrored, min(stamped, size))
             if not self._in_step:
                 self._tail = data[max(0, i - stamped) :]
                 return frames
-        while i < size:
-            magic = data[i]
-            if magic == V2:
-                start = i + 10
-                if start > size:
-                    break
-                length, flags, sequence, source, wire_id = HEADER_V2(data, i)
-                end = start + length
-                following = end + 15 if flags & SIGNED else end + 2
-            elif magic == V1:
-                start = i + 6
-                if start > size:
-                    break
-                length, sequence, source, wire_id = HEADER_V1(data, i)
-                flags = OLD
-                end = start + length
-                following = end + 2
-            else:
-                i = self._hunt(data, mirrored, i)
-                if self._in_step:
-                    continue
-                break
-            if following > size:
-                break
-            entry = lookup(wire_id)
-            if entry is None or crc_hqx(entry[0], crc_hqx(mirrored[i + 1 : end], 0xFFFF)) != CRC(mirrored, end)[0]:
-                doubtful = i
-                i = self._doubt(data, mirrored, i, following)
-                if self._in_step and i > doubtful:
-                    if keep_all and entry is None and i == following + stamped:
-                        frames.append(_unchecked(data, doubtful, start, end, following))
-                    continue
-                break
-            before, i = i, following + stamped
-            if expected.get(source) == sequence:
-                expected[source] = (sequence + 1) & 255
-            else:
-                self._gap(source, sequence)
-            if flags:
-                if flags == OLD:
-                    old += 1
-                elif flags == SIGNED:
-                    self.counters.signed += 1
+        try:
+            while i < size:
+                magic = data[i]
+                if magic == V2:
+                    length, flags, sequence, source, wire_id = HEADER_V2(data, i)
+                    end = i + 10 + length
+                    following = end + trailer + 13 if flags & SIGNED else end + trailer
+                elif magic == V1:
+                    length, sequence, source, wire_id = HEADER_V1(data, i)
+                    flags = 0
+                    end = i + 6 + length
+                    following = end + trailer
                 else:
-                    self.counters.incompatible += 1
-                    continue
-            good += 1
-            if entry[2]:
-                payload = data[start:end]
-                raw = data[before:following] if keep_all or flags == SIGNED else b""
-                version = 1 if flags == OLD else 2
-                stamp = data[before - stamped : before]
-                frames.append(new(Frame, (entry[1], source[0], source[1], sequence, payload, raw, version, stamp)))
+                    i = self._hunt(data, mirrored, i)
+                    if self._in_step:
+                        continue
+                    break
+                if following > limit:
+                    break
+                entry = lookup(wire_id)
+                if (
+                    entry is None
+                    or crc_hqx(mirrored[i + 1 : end], 0xFFFF) ^ entry[0] != back[mirrored[end + 1]] ^ mirrored[end]
+                ):
+                    doubtful = i
+                    i = self._doubt(data, mirrored, i, following)
+                    if self._in_step and i > doubtful:
+                        if keep_all and entry is None and i == following:
+                            frames.append(_unchecked(data, doubtful, end - length, end, following - stamped))
+                        continue
+                    break
+                before = i
+                i = following
+                if expected.get(source) == sequence:
+                    expected[source] = (sequence + 1) & 255
+                else:
+                    self._gap(source, sequence)
+                if flags:
+                    if flags != SIGNED:
+                        self.counters.incompatible += 1
+                        continue
+                    self.counters.signed += 1
+                good += 1
+                if magic == V1:
+                    old += 1
+                if entry[2]:
+                    payload = data[end - length : end]
+                    raw = data[before : i - stamped] if keep_all or flags else b""
+                    stamp = STAMP(data, before - stamped)[0] if stamped else 0
+                    version = 1 if magic == V1 else 2
+                    frames.append(new(Frame, (entry[1], source[0], source[1], sequence, payload, raw, version, stamp)))
+        except struct.error:
+            pass  # the data ends within a header
         self._tail = data[i - stamped :]
         if stamped and before >= 0:
-            self.last_stamp = data[before - stamped : before]
+            (self.last_stamp,) = STAMP(data, before - stamped)
         self.counters.frames += good
         self.counters.frames_v1 += old
         return frames
@@ -242,6 +250,7 @@ class Parser:
     def _doubt(self, data: bytes, mirrored: bytes, i: int, following: int) -> int:
         """Where to go on from a whole frame whose CRC is bad or cannot be checked; `i` itself: wait for more data.
 
+        `following` is where the next frame starts if its length is right.
         The length in a bad frame may be wrong, so a good frame inside it wins. Else both kinds are skipped whole if
         a frame can start behind them; if they end the data while something inside may yet become a frame, more is
         awaited. Else the step is lost.
@@ -252,7 +261,6 @@ class Parser:
         else:
             message_id, sequence, source = data[i + 5], data[i + 2], data[i + 3 : i + 5]
         bad = message_id in CRC_EXTRA
-        following += self._stamp_size
         at_end = following >= len(data)
         inside, open_inside = self._find(data, mirrored, i + 1, following) if bad or at_end else (-1, -1)
         if bad and inside >= 0:
@@ -302,8 +310,8 @@ class Parser:
         end = i + header + data[i + 1]
         if end + (15 if header == 10 and data[i + 2] & SIGNED else 2) > size:
             return OPEN
-        crc = crc_hqx(entry[0], crc_hqx(mirrored[i + 1 : end], 0xFFFF))
-        return VALID if crc == CRC(mirrored, end)[0] else WRONG
+        crc = crc_hqx(mirrored[i + 1 : end], 0xFFFF) ^ entry[0]
+        return VALID if crc == BACK[mirrored[end + 1]] ^ mirrored[end] else WRONG
 
 
 def _unchecked(data: bytes, i: int, start: int, end: int, following: int) -> Frame:

@@ -13,7 +13,6 @@ from ...clock import now as present
 from ...errors import LinkError
 from ...hardware.requests import COMMON, LOOK, wanted_of
 from ...hardware.robot_hw import WANTED_IDS
-from ...link.log import STAMP_SIZE
 from ...link.url import parse
 from ...mavlink.component import LONELY_SYSTEM, Component
 from ...mavlink.framing import Parser
@@ -148,7 +147,7 @@ class _Whole(Recording):
 
     def __init__(self, path: str) -> None:
         super().__init__(path)
-        self._parser = Parser(None, STAMP_SIZE)
+        self._parser = Parser(None, stamped=True)
 
     def counters(self) -> Counters:
         """What was counted so far."""

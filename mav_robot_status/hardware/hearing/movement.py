@@ -36,8 +36,9 @@ def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant
         rebooted(memory, memory.boot, now)
     seen = memory.observation
     seen.global_position = heard(message, at, seen.global_position)
-    velocity = message.vx / 100, message.vy / 100, message.vz / 100
-    speed = _speed(memory, velocity, not any(velocity), message.lat == 0 and message.lon == 0)
+    vx, vy, vz = message.vx, message.vy, message.vz
+    still = not (vx or vy or vz)
+    speed = _speed(memory, vx / 100, vy / 100, vz / 100, still, message.lat == 0 and message.lon == 0)
     _moved(memory, memory.motion, speed, at, options)
 
 
@@ -49,8 +50,8 @@ def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, 
     seen = memory.observation
     seen.local_position = heard(message, at, seen.local_position)
     if not is_fresh(seen.global_position, at, motion.FRESH):
-        velocity = message.vx, message.vy, message.vz
-        speed = _speed(memory, velocity, not any(velocity))
+        vx, vy, vz = message.vx, message.vy, message.vz
+        speed = _speed(memory, vx, vy, vz, not (vx or vy or vz))
         _moved(memory, memory.motion, speed, at, options)
 
 
@@ -62,7 +63,7 @@ def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: Hardware
     if is_fresh(seen.global_position, at, motion.FRESH) or is_fresh(seen.local_position, at, motion.FRESH):
         return
     still = message.groundspeed == 0  # whatever the climb, which comes from the barometer
-    speed = _speed(memory, (message.groundspeed, 0.0, message.climb), still)
+    speed = _speed(memory, message.groundspeed, 0.0, message.climb, still)
     _moved(memory, memory.motion, speed, at, options)
 
 
@@ -96,13 +97,13 @@ def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: 
         rebooted(memory, memory.boot, now)
 
 
-def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, nowhere: bool = False) -> float | None:
+def _speed(memory: Memory, x: float, y: float, z: float, still: bool, nowhere: bool = False) -> float | None:
     """Speed in m/s, None where the numbers mean that there is no estimate: `still` exactly zero, `nowhere` at 0, 0.
 
     ArduPilot sends exactly zero (and its last position) when it has none, and up to 6 m/s at rest while its estimator
     is unhealthy; INAV sends zero without GPS.
     """
-    if not math.isfinite(sum(velocity)):
+    if not math.isfinite(x + y + z):
         return None
     status = memory.observation.sys_status
     if memory.stack is ARDUPILOT:
@@ -112,7 +113,7 @@ def _speed(memory: Memory, velocity: tuple[float, float, float], still: bool, no
             return None
     elif memory.stack is INAV and still and not _has_gps(status):
         return None
-    return math.hypot(*velocity[:2]) if memory.family is ROVER else math.hypot(*velocity)
+    return math.hypot(x, y) if memory.family is ROVER else math.hypot(x, y, z)
 
 
 def _has_gps(status: Heard | None) -> bool:

@@ -11,6 +11,7 @@ import pytest
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.config import Config, ControllerConfig, PublisherConfig, VehicleConfig
+from mav_robot_status.controller import IndustrialRobotStatusController
 from mav_robot_status.errors import ConfigError, LinkError
 from mav_robot_status.gateway.plant import DEFAULT_CONTROLLER, Plant, check
 from mav_robot_status.interface import Audience
@@ -85,6 +86,27 @@ def test_there_is_never_something_due_at_once_again(stdout: TextIO) -> None:
     plant.tick(START)
     assert live(plant, START, 5.0) < 5 * (10 + 10) + 20  # the lines, the looks of the hardware, and a few more
     plant.close(START)
+
+
+def test_a_controller_is_updated_when_its_handle_changes_or_it_is_due_and_not_in_between(
+    stdout: TextIO, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    updates: list[tuple[str, float, float]] = []
+
+    def update(self: IndustrialRobotStatusController, now: Instant, period: float) -> None:
+        updates.append((self.handle.name, round(now.mono - START.mono, 3), round(period, 3)))
+
+    monkeypatch.setattr(IndustrialRobotStatusController, "update", update)
+    monkeypatch.setattr(IndustrialRobotStatusController, "next_due", lambda _, now: now + 2)
+    plant = Plant(Config(), Port(), stdout)
+    for at, frame in ((0.0, heartbeat(1)), (0.5, heartbeat(2)), (1.0, heartbeat(1)), (1.5, heartbeat(2, armed=True))):
+        plant.take(frame, later(START, at))
+        plant.tick(later(START, at))
+    first, second = NAME, f"{NAME}/2.1"
+    assert updates == [(first, 0.0, 0.0), (second, 0.5, 0.0), (second, 1.5, 1.0)]
+    assert plant.next_due(START.mono + 1.5) == START.mono + 2
+    plant.tick(later(START, 2.0))
+    assert updates[3:] == [(first, 2.0, 2.0)]
 
 
 def test_two_controllers_share_an_output_of_the_same_options(installed: list[Collecting], stdout: TextIO) -> None:

@@ -38,7 +38,7 @@ def frame_of(message: Any, ids: Ids = (1, 1), version: int = 2) -> Frame:
     payload: bytes = definition.layout.pack(*message)
     if version == 2:
         payload = payload.rstrip(b"\0") or b"\0"
-    return Frame(definition.id, *ids, 0, payload, raw=b"", version=version, stamp=b"")
+    return Frame(definition.id, *ids, 0, payload, raw=b"", version=version)
 
 
 def statustext(text: str | bytes, severity: int, number: int = 0, chunk: int = 0) -> mav.Statustext:

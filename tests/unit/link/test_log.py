@@ -1,26 +1,37 @@
 import itertools
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_robot_status.errors import UsageError
-from mav_robot_status.link.log import BLOCK, DAY_US, END, SMALL_STEP_US, Counts, LogReader, follows, stamp_of, timed
+from mav_robot_status.link.log import BLOCK, DAY_US, END, SMALL_STEP_US, Counts, LogReader, Stamped, follows, timed
 
 START = 1_700_000_000_000_000
 SECOND = 1_000_000
+
+
+class Record(NamedTuple):
+    stamp: int
+
+
+def records(stamps: list[int], counts: Counts) -> list[Stamped]:
+    """When each stamp was heard, with nothing behind the last one."""
+    found = list(itertools.islice(timed(map(Record, stamps), lambda: END, counts), len(stamps)))
+    assert [it.what.stamp for it in found] == stamps
+    return found
 
 
 def times(stamps: list[float]) -> tuple[list[tuple[float, float, bool]], Counts]:
     """(mono, unix_us since START, new_segment) of each stamp; stamps are seconds since START."""
     counts = Counts()
     micros = [START + round(stamp * SECOND) for stamp in stamps]
-    pieces = zip(micros, [*micros[1:], END], [b""] * len(stamps), strict=True)
     return [
         (round(now.mono, 6), (now.unix_us - START) / SECOND, new_segment)
-        for now, _, new_segment in timed(pieces, counts)
+        for now, _, new_segment in records(micros, counts)
     ], counts
 
 
@@ -31,11 +42,6 @@ def test_a_reader_gives_the_whole_file_in_blocks(tmp_path: Path) -> None:
     blocks = list(LogReader(str(path)).blocks())
     assert b"".join(blocks) == content
     assert {len(block) for block in blocks} == {BLOCK}
-
-
-def test_a_stamp_is_what_stands_before_a_frame() -> None:
-    assert stamp_of(START.to_bytes(8, "big"), 7) == START
-    assert stamp_of(b"", 7) == 7
 
 
 def test_a_small_step_back_is_held_until_the_log_catches_up() -> None:
@@ -89,12 +95,11 @@ def test_a_first_stamp_that_is_wrong_is_left_behind_at_the_second() -> None:
 )
 def test_time_never_runs_backward_whatever_the_stamps(stamps: list[int]) -> None:
     counts = Counts()
-    records = list(timed(zip(stamps, [*stamps[1:], END], [b""] * len(stamps), strict=True), counts))
-    assert len(records) == len(stamps)
-    monos = [r.now.mono for r in records]
+    found = records(stamps, counts)
+    monos = [r.now.mono for r in found]
     assert monos == sorted(monos)
-    assert sum(r.new_segment for r in records) == counts.jumps
-    for before, after in itertools.pairwise(records):
+    assert sum(r.new_segment for r in found) == counts.jumps
+    for before, after in itertools.pairwise(found):
         assert after.new_segment or after.now.unix_us >= before.now.unix_us
 
 

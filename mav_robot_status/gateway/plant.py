@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 NEVER: Final = Instant(0.0, 0)
 """The time of a plant that has not lived yet."""
 DEFAULT_PUBLISHERS: Final = (PublisherConfig("json"), PublisherConfig("mavlink"), PublisherConfig("mirror"))
-LIVE_PUBLISHERS: Final = frozenset({"mavlink", "mirror", "http"})
+LIVE_PUBLISHERS: Final = frozenset({"mavlink", "mirror", "http", "mqtt"})
 """Those that a replay does without: there is nobody to hear MAVLink, and a page would show the end of the log."""
 DEFAULT_CONTROLLER: Final = ControllerConfig(
     "robot_status_controller", "mav_robot_status/IndustrialRobotStatusController", {}, "default"

@@ -1,0 +1,177 @@
+"""What a broker says of all robots, as lines for a board: a status only counts while somebody stands for it.
+
+A status is believed while its robot's connection is ONLINE and it renews itself: two that differ came, the later one
+within the keep-alive. So neither what a broker retained, nor what a bridge or a restarted broker brings up again, is
+ever shown as current, whatever the clocks say. Values in, values out.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from ...clock import rfc3339
+from .lines import unknown
+from .robot import BROKEN, OFFLINE, ONLINE
+
+if TYPE_CHECKING:
+    from ...clock import Instant
+
+MOST_ROBOTS: Final = 4096
+LONGEST: Final = 65_536  # bytes of a status or an event
+WHY: Final = {
+    ONLINE: "the gateway says nothing new",
+    OFFLINE: "the gateway was ended",
+    BROKEN: "the gateway is gone",
+}
+NO_WORD: Final = "no gateway has said that it is there"
+
+
+class _Robot:
+    """What is known of one robot."""
+
+    __slots__ = ("at", "line", "live", "mark", "session", "seq", "state")  # noqa: RUF023
+
+    def __init__(self) -> None:
+        self.state = ""
+        """Of its connection."""
+        self.line: dict[str, Any] = {}
+        self.mark: tuple[Any, Any] = (None, None)
+        """Stamp and seq of the latest status."""
+        self.at = -math.inf
+        """When (monotonic seconds) that came."""
+        self.live = False
+        """Whether it is believed."""
+        self.session, self.seq = "", 0
+        """Of its last event."""
+
+
+class Fleet:
+    """All robots below a prefix."""
+
+    def __init__(self, prefix: str, keepalive: float) -> None:
+        self._start = f"{prefix}/"
+        self._keepalive = keepalive
+        self._robots: dict[str, _Robot] = {}
+        self._news: dict[str, dict[str, Any]] = {}
+        self.events = self.duplicates = self.missing = self.refused = 0
+        """Events that came, came again, did not come though a later one did; publications that are none of ours."""
+
+    def topics(self) -> list[tuple[str, int]]:
+        """What to subscribe to, each with its quality of service."""
+        return [(f"{self._start}+/connection", 1), (f"{self._start}+/status", 0), (f"{self._start}+/events", 1)]
+
+    def begin(self) -> None:
+        """The broker was not heard, and is from now on: events in between went by."""
+        for robot in self._robots.values():
+            robot.session = ""
+
+    def take(self, topic: str, payload: bytes, retained: bool, now: Instant) -> None:
+        """One publication, whatever it holds."""
+        name, _, what = topic[len(self._start) :].partition("/")
+        if not topic.startswith(self._start) or len(payload) > LONGEST or not self._known(name):
+            self.refused += 1
+        elif what == "connection":
+            self._connection(name, payload.decode("ascii", "replace"), now)
+        elif what == "status":
+            self._status(name, payload, retained, now)
+        elif what == "events" and not retained:
+            self._event(name, payload)
+
+    def news(self) -> dict[str, dict[str, Any]]:
+        """The lines that changed since the last call, by robot."""
+        news, self._news = self._news, {}
+        return news
+
+    def expire(self, now: Instant) -> None:
+        """Believe no longer what does not renew itself; to be called every second or so."""
+        for name, robot in self._robots.items():
+            if robot.live and now.mono - robot.at > self._keepalive:
+                self._doubt(name, robot, now)
+
+    def _known(self, name: str) -> bool:
+        if name not in self._robots and len(self._robots) < MOST_ROBOTS:
+            self._robots[name] = _Robot()
+        return name in self._robots
+
+    def _connection(self, name: str, state: str, now: Instant) -> None:
+        robot = self._robots[name]
+        robot.state = state if state in WHY else ""
+        if robot.state != ONLINE:
+            robot.at = -math.inf
+            self._doubt(name, robot, now)
+        elif not robot.live:
+            self._doubt(name, robot, now)
+
+    def _status(self, name: str, payload: bytes, retained: bool, now: Instant) -> None:
+        robot = self._robots[name]
+        line = _parsed(payload) if payload else {}
+        if line is None:
+            self.refused += 1
+            return
+        mark = (line.get("stamp"), line.get("seq"))
+        if mark == robot.mark:
+            return
+        renewed = bool(line) and not retained and now.mono - robot.at <= self._keepalive
+        robot.mark, robot.line, robot.at = mark, line or robot.line, now.mono
+        if renewed and robot.state == ONLINE:
+            robot.live = True
+            self._news[name] = {**line, "handle": name}
+        else:
+            self._doubt(name, robot, now)
+
+    def _event(self, name: str, payload: bytes) -> None:
+        robot = self._robots[name]
+        event = _object(payload)
+        session, seq = (event or {}).get("session"), (event or {}).get("seq")
+        if not isinstance(session, str) or type(seq) is not int:
+            self.refused += 1
+            return
+        if session == robot.session and seq <= robot.seq:
+            self.duplicates += 1
+            return
+        self.events += 1
+        if session == robot.session:
+            self.missing += seq - robot.seq - 1
+        robot.session, robot.seq = session, seq
+
+    def _doubt(self, name: str, robot: _Robot, now: Instant) -> None:
+        robot.live = False
+        line = unknown(robot.line, rfc3339(now.unix_us), WHY.get(robot.state, NO_WORD))
+        self._news[name] = {**line, "handle": name}
+
+
+def _parsed(payload: bytes) -> dict[str, Any] | None:
+    """A native line, as far as others rely on it; None for what is none."""
+    line = _object(payload)
+    if line is None:
+        return None
+    link, vehicle = line.get("link"), line.get("vehicle")
+    fine = (
+        isinstance(line.get("stamp"), str)
+        and isinstance(link, dict)
+        and isinstance(vehicle, dict)
+        and type(link.get("heartbeat_age")) in (int, float, type(None))
+        and all(type(line.get(name)) in (int, type(None)) for name in ("system", "component", "seq"))
+        and all(
+            isinstance(line.get(group), list) and all(isinstance(cause, dict) for cause in line[group])
+            for group in ("errors", "inhibits")
+        )
+    )
+    return line if fine else None
+
+
+def _finite(text: str) -> float:
+    """A browser knows no other numbers."""
+    if not math.isfinite(number := float(text)):
+        raise ValueError(text)
+    return number
+
+
+def _object(payload: bytes) -> dict[str, Any] | None:
+    try:
+        found = json.loads(payload, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None

@@ -1,0 +1,63 @@
+"""What a robot is called on the topics: a template, filled in with what is known of it."""
+
+from __future__ import annotations
+
+import re
+import socket
+import string
+from typing import TYPE_CHECKING, Final
+
+from ...errors import UsageError
+
+if TYPE_CHECKING:
+    from ...interface import RobotStatusMsg
+
+PLACES: Final = ("system", "component", "handle", "host", "serial")
+SERIALS: Final = ("/sys/firmware/devicetree/base/serial-number", "/etc/machine-id")
+"""Where a computer's serial number is: boards with a device tree (Raspberry Pi, Jetson), else the installation's id."""
+LONGEST: Final = 100  # characters of a name
+_NO_LEVEL: Final = re.compile(r"[/+#$\s\x00-\x1f\x7f]+")
+
+
+class Naming:
+    """A template like `agv-{serial}-{system}`. Raises UsageError for one that cannot be filled in."""
+
+    def __init__(self, template: str, host: str | None = None, serials: tuple[str, ...] = SERIALS) -> None:
+        try:
+            self._used = {name for _, name, _, _ in string.Formatter().parse(template) if name is not None}
+            template.format_map(dict.fromkeys(PLACES, ""))
+        except (ValueError, KeyError, IndexError, AttributeError):
+            self._used = {"?"}
+        if self._used - set(PLACES):
+            known = ", ".join(f"{{{place}}}" for place in PLACES)
+            raise UsageError(f"mqtt: robot {template!r} is no template of a name; it may hold {known}")
+        self._template = template
+        self._known = {"host": host if host is not None else socket.gethostname().partition(".")[0]}
+        if "serial" in self._used:
+            self._known["serial"] = _serial(serials)
+        if not level(template.format_map(dict.fromkeys(PLACES, "x"))):
+            raise UsageError(f"mqtt: robot {template!r} gives no name")
+
+    def name(self, msg: RobotStatusMsg) -> str | None:
+        """The robot's name, one level of a topic; None while what the template asks for is not known."""
+        of_vehicle = {"system": msg.detail.system, "component": msg.detail.component, "handle": msg.handle}
+        if any(value is None and place in self._used for place, value in of_vehicle.items()):
+            return None
+        return level(self._template.format_map({**of_vehicle, **self._known}))
+
+
+def level(text: str) -> str:
+    """A text as one level of a topic."""
+    return _NO_LEVEL.sub("-", text)[:LONGEST]
+
+
+def _serial(paths: tuple[str, ...]) -> str:
+    for path in paths:
+        try:
+            with open(path, encoding="ascii", errors="replace") as file:
+                text = file.read(200).strip("\0\n ")
+        except OSError:
+            continue
+        if text:
+            return text
+    raise UsageError("mqtt: this computer tells no serial number; write the robot's name without {serial}")

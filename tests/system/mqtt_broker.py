@@ -1,0 +1,168 @@
+"""mosquitto on a free port of the loopback, with what a test asks for: users, rights, TLS, a bridge to another."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from paho.mqtt.client import Client, MQTTMessage
+from paho.mqtt.enums import CallbackAPIVersion
+
+from .gateway_process import SOON
+
+MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/sbin")
+MISSING = None if MOSQUITTO and shutil.which("openssl") else "mosquitto or openssl is not installed"
+PREFIX = "plant/robots"
+
+
+def free_port() -> int:
+    with socket.socket() as any_port:
+        any_port.bind(("127.0.0.1", 0))
+        return int(any_port.getsockname()[1])
+
+
+class Broker:
+    """One mosquitto; it may be stopped and started again on its port."""
+
+    def __init__(self, folder: Path, *lines: str, port: int | None = None, memory: bool = False) -> None:
+        """`memory`: what is retained outlives a restart."""
+        self.port = port or free_port()
+        folder.mkdir(parents=True, exist_ok=True)
+        self._conf = folder / f"mosquitto-{self.port}.conf"
+        keep = [f"persistence_location {folder}/", "autosave_interval 1"] if memory else []
+        text = [
+            f"listener {self.port} 127.0.0.1",
+            f"persistence {str(memory).lower()}",
+            "max_queued_messages 100000",
+            *keep,
+        ]
+        if not any("allow_anonymous" in line for line in lines):
+            text.append("allow_anonymous true")
+        self._conf.write_text("\n".join([*text, "user root", *lines]) + "\n")
+        self.process: subprocess.Popen[bytes] | None = None
+        self.start()
+
+    @property
+    def url(self) -> str:
+        return f"mqtt://127.0.0.1:{self.port}/{PREFIX}"
+
+    @property
+    def tls_url(self) -> str:
+        return f"mqtts://localhost:{self.port}/{PREFIX}"
+
+    def start(self) -> None:
+        assert MOSQUITTO is not None
+        self.process = subprocess.Popen([MOSQUITTO, "-c", str(self._conf)], stderr=subprocess.DEVNULL)
+        deadline = time.monotonic() + SOON
+        while time.monotonic() < deadline:
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1):
+                return
+            time.sleep(0.02)
+        raise AssertionError(f"mosquitto does not start with {self._conf.read_text()}")
+
+    def stop(self, kill: bool = False) -> None:
+        if self.process is not None:
+            (self.process.kill if kill else self.process.terminate)()
+            self.process.wait(SOON)
+            self.process = None
+
+    close = stop
+
+
+class Heard(NamedTuple):
+    """One publication."""
+
+    at: float
+    robot: str
+    what: str
+    text: str
+    retained: bool
+
+
+class Listener:
+    """Hears everything below the prefix, and remembers it."""
+
+    def __init__(self, port: int, prefix: str = PREFIX) -> None:
+        self.heard: list[Heard] = []
+        self._news = threading.Condition()
+        self._prefix = prefix
+        self._client = Client(CallbackAPIVersion.VERSION2, "listener", clean_session=False)
+        self._client.reconnect_delay_set(1, 1)
+        self._client.on_message = self._take
+        self._client.on_connect = self._subscribe
+        subscribed = threading.Event()
+        self._client.on_subscribe = lambda *_: subscribed.set()
+        self._client.connect("127.0.0.1", port, 5)
+        self._client.loop_start()
+        assert subscribed.wait(SOON)
+
+    def of(self, what: str, robot: str | None = None) -> list[Heard]:
+        with self._news:
+            return [h for h in self.heard if h.what == what and robot in (None, h.robot)]
+
+    def wait_for(self, wanted: Callable[[Heard], bool], timeout: float = SOON, after: float = 0.0) -> Heard:
+        found: Heard = self.wait(lambda: next((h for h in self.heard if h.at > after and wanted(h)), None), timeout)
+        return found
+
+    def wait(self, found: Callable[[], Any], timeout: float = SOON) -> Any:
+        deadline = time.monotonic() + timeout
+        with self._news:
+            while not (result := found()):
+                left = deadline - time.monotonic()
+                assert left > 0, f"not within {timeout} s; last heard: {self.heard[-3:]}"
+                self._news.wait(min(left, 0.5))
+        return result
+
+    def close(self) -> None:
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def _subscribe(self, *_: Any) -> None:
+        self._client.subscribe(f"{self._prefix}/#", 1)
+
+    def _take(self, client: Any, data: Any, message: MQTTMessage) -> None:
+        robot, _, what = message.topic[len(self._prefix) + 1 :].partition("/")
+        text = bytes(message.payload).decode()
+        with self._news:
+            self.heard.append(Heard(time.monotonic(), robot, what, text, message.retain))
+            self._news.notify_all()
+
+
+class Certificates:
+    """An authority, a server's certificate, one that has expired, a client's, and another authority."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in ("ca", "other"):
+            self._openssl(
+                *("req", "-x509", *_KEY, "-keyout", f"{name}.key", "-out", f"{name}.pem", "-days", "2"),
+                *("-subj", f"/CN={name}", "-addext", "basicConstraints=critical,CA:TRUE"),
+            )
+        (folder / "names").write_text("subjectAltName=DNS:localhost,IP:127.0.0.1\n")
+        for name, days in (("server", 2), ("expired", -1), ("client", 2)):
+            self._openssl("req", *_KEY, "-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj", f"/CN={name}")
+            self._openssl(
+                *("x509", "-req", "-in", f"{name}.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-set_serial", "7"),
+                *("-days", str(days), "-extfile", "names", "-out", f"{name}.pem"),
+            )
+
+    def __getitem__(self, name: str) -> str:
+        return str(self._folder / name)
+
+    def lines(self, name: str = "server") -> tuple[str, ...]:
+        """What a broker's configuration says of them."""
+        return f"certfile {self[f'{name}.pem']}", f"keyfile {self[f'{name}.key']}"
+
+    def _openssl(self, *arguments: str) -> None:
+        subprocess.run(["openssl", *arguments], cwd=self._folder, capture_output=True, check=True, timeout=30)
+
+
+_KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")

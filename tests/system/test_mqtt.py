@@ -1,0 +1,568 @@
+"""Statuses over a real broker: what arrives, and what happens when broker, network, disk or gateway do not."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_robot_status.testing import ardurover
+
+from .gateway_process import SOON, Gateway, run
+from .mqtt_broker import MISSING, PREFIX, Broker, Certificates, Heard, Listener, free_port
+from .mqtt_fleet import measure, vehicles
+
+pytestmark = pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+
+ROBOT = "rover-1"
+KEEPALIVE = 2
+Start = Callable[..., Any]
+
+
+@pytest.fixture
+def broker(ended: contextlib.ExitStack, tmp_path: Path) -> Callable[..., Broker]:
+    return lambda *lines, **options: ended.enter_context(contextlib.closing(Broker(tmp_path, *lines, **options)))
+
+
+@pytest.fixture
+def listener(ended: contextlib.ExitStack) -> Callable[..., Listener]:
+    return lambda port, **options: ended.enter_context(contextlib.closing(Listener(port, **options)))
+
+
+@pytest.fixture(scope="session")
+def certificates(tmp_path_factory: pytest.TempPathFactory) -> Certificates:
+    return Certificates(tmp_path_factory.mktemp("certificates"))
+
+
+@pytest.fixture
+def started(gateway: Callable[..., Gateway], tmp_path: Path) -> Callable[..., Gateway]:
+    """A gateway of one rover, with a broker."""
+
+    def start(url: str, *more: str) -> Gateway:
+        return gateway(
+            *("udp:127.0.0.1:0", "--json", "none", "--mqtt", url, "--mqtt-robot", "rover-{system}"),
+            *("--mqtt-spool", str(tmp_path / "spool.sqlite"), "--mqtt-keepalive", str(KEEPALIVE), *more),
+        )
+
+    return start
+
+
+@pytest.fixture
+def board(gateway: Callable[..., Gateway]) -> Callable[..., int]:
+    """A board; the port of its page."""
+
+    def start(url: str, *more: str) -> int:
+        http = free_port()
+        shown = gateway("board", url, "--http", f"127.0.0.1:{http}", "--mqtt-keepalive", str(KEEPALIVE), *more)
+        shown.wait_for_log(r"reading .*/\+")
+        return http
+
+    return start
+
+
+class Feeder:
+    """A gateway that needs no vehicle."""
+
+    def __init__(self, url: str, spool: Path, *arguments: str) -> None:
+        options = (f"spool={spool}", f"keepalive={KEEPALIVE}")
+        command = [sys.executable, "-m", "tests.system.mqtt_feeder", url]
+        for option in options:
+            command += ["--option", option]
+        self.process = subprocess.Popen(
+            [*command, "--events", "1", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        self.told: list[int] = []
+        self.cost: dict[str, Any] = {}
+        self.log: list[str] = []
+        self._threads = [threading.Thread(target=target, daemon=True) for target in (self._read, self._read_log)]
+        for thread in self._threads:
+            thread.start()
+
+    def wait_for(self, changes: int, timeout: float = 60.0) -> None:
+        deadline = time.monotonic() + timeout
+        while len(self.told) < changes:
+            assert time.monotonic() < deadline, (len(self.told), self.log)
+            time.sleep(0.005)
+
+    def end(self, timeout: float = 60.0) -> dict[str, Any]:
+        self.process.wait(timeout)
+        self.close()
+        return self.cost
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        for thread in self._threads:
+            thread.join(SOON)
+        for pipe in (self.process.stdout, self.process.stderr):
+            assert pipe is not None
+            pipe.close()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for text in self.process.stdout:
+            line = json.loads(text)
+            if "change" in line:
+                self.told.append(line["change"])
+            else:
+                self.cost = line
+
+    def _read_log(self) -> None:
+        assert self.process.stderr is not None
+        self.log.extend(text.rstrip() for text in self.process.stderr)
+
+
+@pytest.fixture
+def feeder(ended: contextlib.ExitStack, tmp_path: Path) -> Callable[..., Feeder]:
+    return lambda url, *arguments, spool=tmp_path / "spool.sqlite": ended.enter_context(
+        contextlib.closing(Feeder(url, spool, *arguments))
+    )
+
+
+class Wall:
+    """A TCP relay that may be cut: nothing passes any more, and nobody is told."""
+
+    def __init__(self, port: int) -> None:
+        self._to = port
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listening.getsockname()[1]
+        self.cut = False
+        self._stop = False
+        self._pairs: list[tuple[socket.socket, socket.socket]] = []
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._stop = True
+        self._thread.join(SOON)
+        for end in [self._listening, *(end for pair in self._pairs for end in pair)]:
+            end.close()
+
+    def _run(self) -> None:
+        while not self._stop:
+            if self.cut:
+                time.sleep(0.01)
+                continue
+            ways = {a: b for pair in self._pairs for a, b in (pair, pair[::-1])}
+            readable, _, _ = select.select([self._listening, *ways], [], [], 0.05)
+            for end in readable:
+                if end is self._listening:
+                    self._pairs.append((end.accept()[0], socket.create_connection(("127.0.0.1", self._to))))
+                elif end.fileno() >= 0:
+                    self._pass(end, ways[end])
+
+    def _pass(self, end: socket.socket, other: socket.socket) -> None:
+        data = b""
+        with contextlib.suppress(OSError):
+            data = end.recv(65536)
+            other.sendall(data)
+        if not data:
+            self._pairs = [pair for pair in self._pairs if end not in pair]
+            end.close()
+            other.close()
+
+
+@pytest.fixture
+def wall(ended: contextlib.ExitStack) -> Callable[[int], Wall]:
+    return lambda port: ended.enter_context(contextlib.closing(Wall(port)))
+
+
+def online(heard: Heard) -> bool:
+    return (heard.what, heard.text) == ("connection", "ONLINE")
+
+
+def changes(events: list[Heard]) -> list[int]:
+    """The numbers of the changes, as they came, without those that came again."""
+    found, seen = [], set()
+    for heard in events:
+        event = json.loads(heard.text)
+        if event["id"] not in seen:
+            seen.add(event["id"])
+            found.append(event["changed"]["error_code"]["new"])
+    return found
+
+
+def eventually(found: Callable[[], Any], timeout: float = SOON) -> Any:
+    deadline = time.monotonic() + timeout
+    while not (result := found()):
+        assert time.monotonic() < deadline, f"not within {timeout} s"
+        time.sleep(0.05)
+    return result
+
+
+def shown(http: int, robot: str) -> dict[str, Any]:
+    return next((line for line in vehicles(http) if line["handle"] == robot), {"link": {"state": None}, "mode": None})
+
+
+# -- what arrives ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("version", ["5", "3.1.1"])
+def test_a_robot_is_told_from_its_first_word_to_its_last(
+    broker: Start, listener: Start, started: Start, autopilot: Start, validate: Callable[[Any], None], version: str
+) -> None:
+    at = broker()
+    heard = listener(at.port)
+    gateway = started(at.url, "--mqtt-version", version)
+    autopilot(ardurover.READY, gateway.address)
+    heard.wait_for(online)
+    status = heard.wait_for(lambda h: h.what == "status" and json.loads(h.text)["mode"] != "UNKNOWN")
+    validate(json.loads(status.text))
+    first = json.loads(heard.wait_for(lambda h: h.what == "events").text)
+    assert (first["seq"], first["robot"], first["system"], first["dropped"]) == (1, ROBOT, 1, 0)
+    assert first["changed"]["mode"]["old"] is None
+    assert gateway.stop() == 0
+    heard.wait_for(lambda h: h.what == "connection" and h.text == "OFFLINE")
+    kept = {h.what: h.text for h in _retained(listener, at.port)}
+    assert kept["connection"] == "OFFLINE"
+    validate(json.loads(kept["status"]))
+    assert json.loads(kept["status"])["mode"] == "UNKNOWN"
+    assert "events" not in kept
+
+
+def _retained(listener: Start, port: int) -> list[Heard]:
+    late = listener(port)
+    late.wait_for(lambda h: h.what == "connection")
+    time.sleep(0.2)
+    return [h for h in late.heard if h.retained]
+
+
+def test_events_tell_each_member_that_changed_with_what_it_was(
+    broker: Start, listener: Start, started: Start, wire: Start
+) -> None:
+    at = broker()
+    heard = listener(at.port)
+    gateway = started(at.url)
+    rover = wire(gateway.address).beating()
+    heard.wait_for(lambda h: h.what == "events")
+    rover.beat(armed=True, custom_mode=10)
+    event = heard.wait_for(lambda h: h.what == "events" and json.loads(h.text)["changed"].get("mode", {}).get("old"))
+    changed = json.loads(event.text)["changed"]
+    assert changed["mode"] == {"old": "MANUAL", "new": "AUTO"}
+    assert changed["vehicle.flight_mode"] == {"old": "MANUAL", "new": "AUTO"}
+    assert "stamp" not in changed
+
+
+def test_with_mqtt_5_a_status_that_nobody_renews_leaves_the_broker_by_itself(
+    broker: Start, listener: Start, feeder: Start
+) -> None:
+    at = broker()
+    heard = listener(at.port)
+    gateway = feeder(at.url, "--rate", "5")
+    heard.wait_for(lambda h: h.what == "status")
+    gateway.process.kill()
+    heard.wait_for(lambda h: h.text == "CONNECTIONBROKEN")
+    time.sleep(KEEPALIVE * 1.5 + 2.5)
+    assert {h.what: h.text for h in _retained(listener, at.port)} == {"connection": "CONNECTIONBROKEN"}
+
+
+def test_tls_with_a_client_certificate_and_a_password_from_the_environment(
+    broker: Start, started: Start, certificates: Certificates, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at = broker(
+        *("allow_anonymous false", _passwords(tmp_path), f"cafile {certificates['ca.pem']}"),
+        *(*certificates.lines(), "require_certificate true"),
+    )
+    monkeypatch.setenv("MAV_ROBOT_STATUS_MQTT_PASSWORD", "correct horse")
+    trusted = ("--system", "1", "--mqtt-ca", certificates["ca.pem"], "--mqtt-user", "rover")
+    gateway = started(
+        at.tls_url, *trusted, "--mqtt-cert", certificates["client.pem"], "--mqtt-key", certificates["client.key"]
+    )
+    gateway.wait_for_log(r"mqtt: localhost:\d+: connected")
+    assert "horse" not in "".join(gateway.log)
+    assert "horse" not in Path(f"/proc/{gateway.process.pid}/cmdline").read_text()
+
+
+def _passwords(folder: Path) -> str:
+    path = folder / "passwords"
+    subprocess.run(["mosquitto_passwd", "-b", "-c", str(path), "rover", "correct horse"], check=True, timeout=30)
+    return f"password_file {path}"
+
+
+# -- nothing lost ----------------------------------------------------------------------------------------------------
+
+
+def test_a_broker_that_is_away_for_a_while_gets_every_event_in_order(
+    broker: Start, listener: Start, feeder: Start
+) -> None:
+    at = broker(memory=True)
+    gateway = feeder(at.url, "--rate", "100", "--changes", "900", "--seconds", "60")
+    heard = listener(at.port)
+    gateway.wait_for(200)
+    at.stop()
+    gateway.wait_for(600)
+    at.start()
+    heard.wait(lambda: len(changes(heard.of("events"))) >= 900, 30)
+    assert gateway.end()["waiting"] == 0
+    told = changes(heard.of("events"))
+    assert told == gateway.told
+    assert len([line for line in gateway.log if "trying again" in line]) <= 2, gateway.log
+
+
+def test_a_gateway_that_is_killed_leaves_its_events_to_the_next(broker: Start, listener: Start, feeder: Start) -> None:
+    at = broker()
+    at.stop()
+    killed = feeder(at.url, "--rate", "100", "--seconds", "60")
+    killed.wait_for(300)
+    killed.process.send_signal(signal.SIGKILL)
+    killed.end()
+    at.start()
+    heard = listener(at.port)
+    feeder(at.url, "--rate", "1", "--robots", "1")
+    told = heard.wait(lambda: len(found := changes(heard.of("events"))) > 298 and found, 20)
+    beginning = told.index(1, 1) if 1 in told[1:] else len(told)
+    of_killed = told[:beginning]
+    assert of_killed == list(range(1, len(of_killed) + 1))
+    assert len(killed.told) - len(of_killed) <= 3  # the last hundredths of a second before the kill
+
+
+def test_a_network_that_is_cut_costs_no_event_and_is_noticed_on_both_sides(
+    broker: Start, listener: Start, feeder: Start, wall: Start
+) -> None:
+    at = broker()
+    heard = listener(at.port)
+    between = wall(at.port)
+    gateway = feeder(f"mqtt://127.0.0.1:{between.port}/{PREFIX}", "--rate", "20", "--seconds", "60")
+    gateway.wait_for(40)
+    between.cut = True
+    broken = heard.wait_for(lambda h: h.text == "CONNECTIONBROKEN", KEEPALIVE * 1.5 + 3)
+    gateway.wait_for(len(gateway.told) + 100)
+    between.cut = False
+    heard.wait_for(online, 20, after=broken.at)
+    count = len(gateway.told)
+    heard.wait(lambda: len(changes(heard.of("events"))) >= count, 20)
+    told = changes(heard.of("events"))
+    assert told == list(range(1, len(told) + 1))
+    time.sleep(KEEPALIVE * 2)
+    assert heard.of("connection")[-1].text == "ONLINE"  # the will of the old connection does not come after it
+
+
+def test_a_full_disk_loses_nothing_while_memory_holds(
+    broker: Start, listener: Start, feeder: Start, tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    with _small(disk) as full:
+        at = broker()
+        at.stop()
+        gateway = feeder(at.url, "--rate", "100", "--changes", "900", "--seconds", "60", spool=disk / "s.sqlite")
+        gateway.wait_for(100)
+        full()
+        gateway.wait_for(500)
+        at.start()
+        heard = listener(at.port)
+        heard.wait(lambda: len(changes(heard.of("events"))) >= 900, 30)
+        assert changes(heard.of("events")) == gateway.told
+        assert gateway.end()["dropped"] == 0
+        assert len([line for line in gateway.log if "takes no events" in line]) == 1, gateway.log
+
+
+@contextlib.contextmanager
+def _small(folder: Path) -> Iterator[Callable[[], None]]:
+    """A disk of 300 kB; what is given fills it."""
+    mount = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(folder)], capture_output=True)
+    if mount.returncode:
+        pytest.skip("mounting is not permitted here")
+
+    def fill() -> None:
+        with contextlib.suppress(OSError), open(folder / "rubbish", "wb", buffering=0) as file:
+            while True:
+                file.write(bytes(512))
+
+    try:
+        yield fill
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_what_is_too_much_is_dropped_from_the_oldest_on_and_counted(
+    broker: Start, listener: Start, feeder: Start
+) -> None:
+    at = broker()
+    at.stop()
+    gateway = feeder(at.url, *("--rate", "100", "--changes", "400", "--seconds", "60", "--option", "spool_size=0.05"))
+    gateway.wait_for(300)
+    at.start()
+    heard = listener(at.port)
+    last = heard.wait_for(lambda h: h.what == "events" and '"new": 400}' in h.text, 20)
+    told = changes(heard.of("events"))
+    assert told == list(range(401 - len(told), 401))
+    assert json.loads(last.text)["dropped"] == 400 - len(told) > 0
+    assert gateway.end()["dropped"] == 400 - len(told)
+
+
+# -- the board -------------------------------------------------------------------------------------------------------
+
+
+def test_every_board_shows_a_robot_and_that_its_gateway_was_killed(
+    broker: Start, board: Start, started: Start, autopilot: Start
+) -> None:
+    at = broker()
+    boards = [board(at.url), board(at.url)]
+    gateway = started(at.url)
+    autopilot(ardurover.READY, gateway.address)
+    eventually(lambda: all(shown(http, ROBOT)["mode"] in ("MANUAL", "AUTO") for http in boards))
+    gateway.process.kill()
+    killed = time.monotonic()
+    eventually(lambda: all(shown(http, ROBOT)["link"]["state"] == "LOST" for http in boards), KEEPALIVE)
+    assert time.monotonic() - killed < KEEPALIVE
+    for line in (shown(http, ROBOT) for http in boards):
+        assert (line["mode"], line["e_stopped"], line["in_error"]) == ("UNKNOWN", None, None)
+        assert line["inhibits"][0]["text"] == "the gateway is gone"
+
+
+def test_a_status_that_a_broker_kept_over_its_own_end_is_never_shown_as_current(
+    broker: Start, board: Start, feeder: Start, listener: Start
+) -> None:
+    at = broker(memory=True)
+    gateway = feeder(at.url, "--rate", "5", "--events", "0", "--option", "version=3.1.1")
+    listener(at.port).wait_for(lambda h: h.what == "status")
+    time.sleep(2.5)  # the broker saves what it keeps
+    at.stop(kill=True)  # so that nobody says the will
+    gateway.process.kill()
+    at.start()
+    kept = {h.what: h.text for h in _retained(listener, at.port)}
+    assert kept["connection"] == "ONLINE"
+    assert json.loads(kept["status"])["mode"] == "AUTO"
+    http = board(at.url)
+    line = eventually(lambda: (it := shown(http, "robot0"))["link"]["state"] and it)
+    assert (line["link"]["state"], line["mode"]) == ("LOST", "UNKNOWN")
+
+
+def test_a_board_beyond_a_bridge_shows_what_is_so_and_doubts_it_when_the_bridge_is_down(
+    broker: Start, board: Start, feeder: Start
+) -> None:
+    near = broker()
+    far = broker(
+        *("connection bridge", f"address 127.0.0.1:{near.port}", f"topic {PREFIX}/# in 1"),
+        *("restart_timeout 1", "keepalive_interval 5", "remote_clientid bridge"),
+    )
+    http = board(far.url)
+    feeder(near.url, "--rate", "5", "--seconds", "60")
+    eventually(lambda: shown(http, "robot0")["mode"] == "AUTO", 15)
+    near.stop(kill=True)
+    eventually(lambda: shown(http, "robot0")["mode"] == "UNKNOWN", KEEPALIVE + 2)
+    near.start()
+    eventually(lambda: shown(http, "robot0")["mode"] == "AUTO", 40)
+
+
+def test_a_board_without_its_broker_says_so(broker: Start, board: Start, feeder: Start) -> None:
+    at = broker()
+    http = board(at.url)
+    feeder(at.url, "--rate", "5", "--seconds", "60")
+    eventually(lambda: shown(http, "robot0")["mode"] == "AUTO")
+    at.stop(kill=True)
+    eventually(lambda: shown(http, "robot0")["mode"] == "UNKNOWN", KEEPALIVE + 2)
+
+
+def test_two_hundred_robots_on_one_board(tmp_path: Path) -> None:
+    found = measure(200, 2, 4.0, tmp_path)
+    assert (found["live_on_the_board"], found["events_missing"]) == (200, 0)
+    assert found["events_on_the_board"] == found["events_told"]
+    assert found["board_cpu_percent"] < 50
+
+
+# -- what a person has to put right ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("lines", "more", "says"),
+    [
+        pytest.param(["secure"], ["--mqtt-user", "rover", "--mqtt-password-file", "WRONG"], "refuses", id="password"),
+        pytest.param(["tls"], ["--mqtt-ca", "other.pem"], "certificate is not believed", id="another CA"),
+        pytest.param(["expired"], ["--mqtt-ca", "ca.pem"], "certificate has expired", id="expired"),
+        pytest.param(["mutual"], ["--mqtt-ca", "ca.pem"], "client certificate", id="no client certificate"),
+        pytest.param(["forbidden"], [], "may not do what is asked", id="forbidden will"),
+        pytest.param(["no events"], [], "does not let us publish", id="forbidden events"),
+        pytest.param(["nobody"], [], "Connection refused", id="no broker"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_tried_again_without_hurry(
+    broker: Start,
+    started: Start,
+    certificates: Certificates,
+    tmp_path: Path,
+    lines: list[str],
+    more: list[str],
+    says: str,
+) -> None:
+    rights = tmp_path / "rights"
+    rights.write_text(
+        f"topic write {PREFIX}/+/connection\ntopic write {PREFIX}/+/status\n"
+        if lines == ["no events"]
+        else "topic read x\n"
+    )
+    wrong = tmp_path / "wrong"
+    wrong.write_text("swordfish")
+    wrong.chmod(0o600)
+    kinds: dict[str, tuple[str, ...]] = {
+        "secure": ("allow_anonymous false", _passwords(tmp_path)),
+        "tls": certificates.lines(),
+        "expired": certificates.lines("expired"),
+        "mutual": (*certificates.lines(), f"cafile {certificates['ca.pem']}", "require_certificate true"),
+        "forbidden": (f"acl_file {rights}",),
+        "no events": (f"acl_file {rights}",),
+        "nobody": (),
+    }
+    at = broker(*kinds[lines[0]])
+    if lines == ["nobody"]:
+        at.stop()
+    files = {name: certificates[name] for name in ("ca.pem", "other.pem")} | {"WRONG": str(wrong)}
+    secure = lines[0] in ("tls", "expired", "mutual")
+    gateway = started(at.tls_url if secure else at.url, "--system", "1", *(files.get(word, word) for word in more))
+    gateway.wait_for_log(says)
+    used = gateway.cpu()
+    time.sleep(4)
+    assert gateway.cpu() - used < 0.5
+    complaints = [line for line in gateway.log if "trying again" in line]
+    assert len(complaints) == 1, gateway.log
+    assert "swordfish" not in "".join(gateway.log)
+    assert gateway.stop() == 0
+    assert "Traceback" not in "".join(gateway.log)
+
+
+def test_two_gateways_that_publish_one_robot_are_told(broker: Start, feeder: Start, tmp_path: Path) -> None:
+    at = broker()
+    first = feeder(at.url, "--rate", "5", "--seconds", "60")
+    first.wait_for(3)
+    feeder(at.url, "--rate", "5", "--seconds", "60", spool=tmp_path / "other.sqlite")
+    eventually(lambda: any("does another gateway publish the same robot" in line for line in first.log))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--mqtt", "mqtts://rover:swordfish@broker/robots"], "no user or password in the URL"),
+        (["--mqtt", "http://broker/robots"], "is no broker; write mqtts://"),
+        (["--mqtt", "mqtts://broker"], "names no prefix"),
+        (["--mqtt-user", "rover"], "add --mqtt mqtts://broker/prefix"),
+        (["--mqtt", "mqtt://127.0.0.1/robots", "--mqtt-robot", "{color}"], r"it may hold \{system\}"),
+        (["--mqtt", "mqtts://127.0.0.1/robots", "--mqtt-ca", "/nowhere.pem"], "No such file"),
+        (["--mqtt", "mqtt://127.0.0.1/robots", "--mqtt-spool", "/proc/x/s"], "events cannot wait in /proc/x/s"),
+    ],
+)
+def test_a_fault_on_the_command_line_is_one_line(arguments: list[str], says: str) -> None:
+    done = run("udp:127.0.0.1:0", *arguments)
+    assert done.returncode in (1, 2)
+    assert re.search(says, done.stderr), done.stderr
+    assert "swordfish" not in done.stderr
+    assert len([line for line in done.stderr.splitlines() if "listening" not in line]) == 1
+    assert "Traceback" not in done.stderr
+
+
+def test_a_recorded_log_is_not_published(demo_log: Path) -> None:
+    done = run(str(demo_log), "--mqtt", "mqtt://127.0.0.1/robots")
+    assert done.returncode == 2
+    assert "replay it without --mqtt" in done.stderr

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import json
+
+from mav_robot_status.interface import (
+    Detail,
+    ErrorCause,
+    LinkState,
+    RobotMode,
+    RobotStatus,
+    RobotStatusMsg,
+    TriState,
+    Vehicle,
+)
+from mav_robot_status.publishers.mqtt.lines import event_of, line_of, unknown
+
+BEFORE = RobotStatus(RobotMode.MANUAL, in_error=TriState.FALSE), Detail(1, 1)
+AFTER = (
+    RobotStatus(RobotMode.AUTO, in_error=TriState.TRUE, error_code=3),
+    Detail(1, 1, errors=(ErrorCause(3, "BATTERY", None, 0),), vehicle=Vehicle(flight_mode="AUTO")),
+)
+MSG = RobotStatusMsg("rover", 1_000_000, *AFTER, 0.5)
+
+
+def test_a_status_is_the_native_line() -> None:
+    line = json.loads(line_of(MSG, 4))
+    assert (line["seq"], line["handle"], line["mode"], line["link"]["heartbeat_age"]) == (4, "rover", "AUTO", 0.5)
+
+
+def test_an_event_has_an_id_and_tells_only_what_changed() -> None:
+    event = event_of(MSG, BEFORE, "r1", "abcd", 9)
+    assert (event["id"], event["session"], event["seq"], event["robot"]) == ("abcd-9", "abcd", 9, "r1")
+    assert event["stamp"] == "1970-01-01T00:00:01.000000Z"
+    assert event["changed"].keys() == {"mode", "in_error", "error_code", "errors", "vehicle.flight_mode"}
+    assert event["changed"]["error_code"] == {"old": 0, "new": 3}
+    assert event["changed"]["errors"]["old"] == []
+
+
+def test_the_first_event_tells_all_members() -> None:
+    changed = event_of(MSG, None, "r1", "abcd", 1)["changed"]
+    assert {change["old"] for change in changed.values()} == {None}
+    assert changed["link.state"]["new"] == LinkState.CONNECTED.value
+
+
+def test_of_a_robot_that_nobody_speaks_for_only_who_it_is_stays() -> None:
+    left = unknown(json.loads(line_of(MSG, 4)), "now", "why")
+    assert (left["system"], left["mode"], left["in_error"], left["errors"]) == (1, "UNKNOWN", None, [])
+    assert (left["vehicle"]["flight_mode"], left["link"]["state"]) == (None, "LOST")
+    assert left["inhibits"] == [{"name": "LINK_STALE", "text": "why", "since": "now"}]
+    assert unknown({}, "now", None)["link"]["state"] == "NEVER_SEEN"

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mav_robot_status.errors import UsageError
+from mav_robot_status.interface import Detail, RobotStatus, RobotStatusMsg
+from mav_robot_status.publishers.mqtt.naming import Naming
+
+
+def msg(system: int | None = 7, handle: str = "rover") -> RobotStatusMsg:
+    return RobotStatusMsg(handle, 0, RobotStatus(), Detail(system, None if system is None else 1), None)
+
+
+def test_a_name_is_made_of_what_is_known(tmp_path: Path) -> None:
+    serial = tmp_path / "serial"
+    serial.write_text("1000abcd\0")
+    naming = Naming("{host}.{serial}.{system}.{component}.{handle}", "pi", ("/nowhere", str(serial)))
+    assert naming.name(msg()) == "pi.1000abcd.7.1.rover"
+
+
+def test_a_name_may_be_a_serial_number_as_it_is() -> None:
+    assert Naming("AGV-0042").name(msg(None)) == "AGV-0042"
+
+
+def test_without_what_the_template_asks_for_there_is_no_name_yet() -> None:
+    assert Naming("{host}-{system}", "pi").name(msg(None)) is None
+
+
+def test_a_name_is_one_level_of_a_topic() -> None:
+    assert Naming("a/b+{handle}").name(msg(handle="x y/#\0z")) == "a-b-x-y-z"
+    assert len(Naming("{handle}").name(msg(handle="x" * 500)) or "") == 100
+
+
+@pytest.mark.parametrize("template", ["{color}", "{system.real}", "{0}", "{", "{system!q}", ""])
+def test_what_is_no_template_is_one_line(template: str) -> None:
+    with pytest.raises(UsageError, match="robot"):
+        Naming(template)
+
+
+def test_a_serial_number_that_nobody_knows_is_said() -> None:
+    with pytest.raises(UsageError, match=r"without \{serial\}"):
+        Naming("{serial}", serials=("/nowhere",))

@@ -1,0 +1,93 @@
+"""The publisher without a broker: what it hands over waits on the disk. tests/system has a real one."""
+
+from __future__ import annotations
+
+import io
+import json
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_robot_status.clock import Instant
+from mav_robot_status.errors import UsageError
+from mav_robot_status.interface import Detail, PublisherContext, RobotMode, RobotStatus, RobotStatusMsg
+from mav_robot_status.publishers.mqtt.publisher import MqttPublisher
+
+from ..port import Port
+
+MANUAL, AUTO = RobotStatus(RobotMode.MANUAL), RobotStatus(RobotMode.AUTO)
+NOBODY = "mqtt://127.0.0.1:1/robots"
+
+
+def msg(status: RobotStatus, handle: str = "rover", system: int | None = 1) -> RobotStatusMsg:
+    return RobotStatusMsg(handle, 0, status, Detail(system, 1), None)
+
+
+@pytest.fixture
+def spool(tmp_path: Path) -> Path:
+    return tmp_path / "spool.sqlite"
+
+
+@pytest.fixture
+def publish(spool: Path) -> Callable[..., list[dict[str, Any]]]:
+    """Publish at these times; the events that wait after the end."""
+
+    def run(*messages: RobotStatusMsg, patient: bool = False, **options: object) -> list[dict[str, Any]]:
+        asked = {"url": NOBODY, "spool": str(spool), "robot": "r{system}", **options}
+        publisher = MqttPublisher(PublisherContext(asked, Port(), io.StringIO(), patient))
+        for number, message in enumerate(messages):
+            assert not publisher.busy()
+            publisher.publish(message)
+            publisher.service(Instant(float(number), number * 1_000_000))
+        publisher.close()
+        if not spool.exists():
+            return []
+        with closing(sqlite3.connect(spool)) as db:
+            return [json.loads(text) for (text,) in db.execute("SELECT text FROM events ORDER BY place")]
+
+    return run
+
+
+def test_each_change_is_an_event_and_a_repetition_is_none(publish: Callable[..., list[dict[str, Any]]]) -> None:
+    events = publish(msg(MANUAL), msg(MANUAL), msg(AUTO), msg(MANUAL))
+    assert [event["seq"] for event in events] == [1, 2, 3]
+    assert [event["changed"]["mode"]["new"] for event in events] == ["MANUAL", "AUTO", "MANUAL"]
+    assert len({event["session"] for event in events}) == 1
+
+
+def test_the_next_run_is_another_session(publish: Callable[..., list[dict[str, Any]]]) -> None:
+    publish(msg(MANUAL))
+    events = publish(msg(MANUAL))
+    assert len({event["session"] for event in events}) == 2
+    assert len({event["id"] for event in events}) == 2
+
+
+def test_robots_are_told_apart(publish: Callable[..., list[dict[str, Any]]]) -> None:
+    events = publish(msg(MANUAL), msg(AUTO, "other", 2), msg(AUTO))
+    assert [(event["robot"], event["seq"]) for event in events] == [("r1", 1), ("r2", 1), ("r1", 2)]
+
+
+def test_a_second_robot_of_the_same_name_is_left_out(
+    publish: Callable[..., list[dict[str, Any]]], caplog: pytest.LogCaptureFixture
+) -> None:
+    events = publish(msg(MANUAL), msg(AUTO, "other"), msg(MANUAL, "other"))
+    assert [event["handle"] for event in events] == ["rover"]
+    assert caplog.text.count("would both be the robot 'r1'") == 1
+
+
+def test_a_robot_without_a_name_waits_for_it(publish: Callable[..., list[dict[str, Any]]]) -> None:
+    assert [event["system"] for event in publish(msg(MANUAL, system=None), msg(MANUAL))] == [1]
+
+
+def test_a_replay_says_nothing(publish: Callable[..., list[dict[str, Any]]], spool: Path) -> None:
+    assert publish(msg(MANUAL), patient=True) == []
+    assert not spool.exists()
+
+
+def test_a_fault_in_the_options_is_told_before_anything_begins(publish: Callable[..., list[dict[str, Any]]]) -> None:
+    with pytest.raises(UsageError, match="unknown option 'topic'"):
+        publish(topic="x")

@@ -1,0 +1,187 @@
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mav_robot_status.errors import LinkError
+from mav_robot_status.publishers.mqtt import spool as module
+from mav_robot_status.publishers.mqtt.spool import CLOCK_SET, OVERHEAD, RETRY, SWEEP, Spool
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> str:
+    return str(tmp_path / "folder" / "spool.sqlite")
+
+
+@pytest.fixture
+def spool(path: str) -> Iterator[Spool]:
+    made = Spool(path, 10_000, 100.0)
+    yield made
+    made.close(0.0, 0.0)
+
+
+def fill(spool: Spool, *texts: str, robot: str = "r", at: float = 0.0, now: float = 0.0) -> None:
+    for text in texts:
+        spool.add(robot, text, at)
+    spool.flush(now, at)
+
+
+def texts(spool: Spool, robot: str = "r", place: int = 0, limit: int = 100) -> list[str]:
+    return [event.text for event in spool.after(robot, place, limit)]
+
+
+def test_events_come_back_in_order_and_by_robot(spool: Spool) -> None:
+    fill(spool, "a", "b")
+    fill(spool, "x", robot="other")
+    fill(spool, "c")
+    assert texts(spool) == ["a", "b", "c"]
+    assert texts(spool, "other") == ["x"]
+    first = spool.after("r", 0, 1)[0]
+    assert texts(spool, place=first.place, limit=1) == ["b"]
+    assert sorted(spool.robots()) == ["other", "r"]
+    assert spool.waiting == 4
+
+
+def test_what_is_done_does_not_come_again(spool: Spool) -> None:
+    fill(spool, "a", "b")
+    spool.done(spool.after("r", 0, 1)[0])
+    assert texts(spool) == ["b"]
+    spool.flush(0.0, 0.0)
+    assert texts(spool) == ["b"]
+    assert spool.waiting == 1
+
+
+def test_what_waits_outlives_its_process(path: str) -> None:
+    killed = Spool(path, 10_000, 100.0)
+    fill(killed, "a", "b")
+    killed._db.close()  # as the kernel does, without a word
+    again = Spool(path, 10_000, 100.0)
+    fill(again, "c")
+    assert texts(again) == ["a", "b", "c"]
+    again.close(0.0, 0.0)
+
+
+def test_a_second_gateway_is_told_to_take_another_file(spool: Spool, path: str) -> None:
+    fill(spool, "a")
+    with pytest.raises(LinkError, match="give each its own --mqtt-spool"):
+        Spool(path, 10_000, 100.0)
+
+
+def test_a_file_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(LinkError, match="events cannot wait in"):
+        Spool(str(tmp_path / "file" / "spool"), 10_000, 100.0)
+
+
+def test_a_broken_file_is_kept_aside(path: str, caplog: pytest.LogCaptureFixture) -> None:
+    os.makedirs(os.path.dirname(path))
+    Path(path).write_bytes(b"no database" * 1000)
+    made = Spool(path, 10_000, 100.0)
+    fill(made, "a")
+    assert texts(made) == ["a"]
+    made.close(0.0, 0.0)
+    assert Path(f"{path}.broken").read_bytes().startswith(b"no database")
+    assert "was broken" in caplog.text
+
+
+def test_the_oldest_are_dropped_when_there_are_too_many_bytes(path: str, caplog: pytest.LogCaptureFixture) -> None:
+    made = Spool(path, 3 * (OVERHEAD + 1), 100.0)
+    fill(made, "a", "b", "c", "d", "e")
+    assert texts(made) == ["c", "d", "e"]
+    assert (made.waiting, made.dropped["r"]) == (3, 2)
+    assert "2 events were dropped" in caplog.text
+    made.close(0.0, 0.0)
+    again = Spool(path, 3 * (OVERHEAD + 1), 100.0)
+    assert again.dropped["r"] == 2
+    again.close(0.0, 0.0)
+
+
+def test_what_is_too_old_is_dropped(spool: Spool) -> None:
+    fill(spool, "before the clock was set", at=5.0)
+    fill(spool, "a", at=CLOCK_SET)
+    fill(spool, "b", at=CLOCK_SET + 90.0, now=SWEEP)
+    spool.flush(2 * SWEEP, CLOCK_SET + 150.0)
+    assert texts(spool) == ["before the clock was set", "b"]
+    assert spool.dropped["r"] == 1
+
+
+def test_an_event_that_was_dropped_while_it_was_on_its_way_counts_once(path: str) -> None:
+    made = Spool(path, 2 * (OVERHEAD + 1), 100.0)
+    fill(made, "a", "b")
+    on_its_way = made.after("r", 0, 1)[0]
+    fill(made, "c")
+    made.done(on_its_way)
+    made.flush(0.0, 0.0)
+    assert (made.waiting, texts(made)) == (2, ["b", "c"])
+    made.close(0.0, 0.0)
+
+
+def test_while_the_disk_is_full_events_wait_in_memory(spool: Spool, caplog: pytest.LogCaptureFixture) -> None:
+    fill(spool, "a")
+    pages = spool._db.execute("PRAGMA page_count").fetchone()[0]
+    spool._db.execute(f"PRAGMA max_page_count = {pages}")
+    fill(spool, "b" * 8000)
+    fill(spool, "c", now=2 * RETRY)
+    assert spool.failed
+    assert [text[0] for text in texts(spool)] == ["a", "b", "c"]
+    for event in spool.after("r", 0, 2):
+        spool.done(event)
+    assert texts(spool) == ["c"]
+    spool._db.execute("PRAGMA max_page_count = 100000")
+    spool.flush(4 * RETRY, 0.0)
+    assert not spool.failed
+    assert (texts(spool), spool.waiting) == (["c"], 1)
+    assert len([r for r in caplog.records if r.levelno == logging.WARNING]) == 2
+
+
+def test_memory_is_bounded_too(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_UNWRITTEN", 3)
+    for text in "abcde":
+        spool.add("r", text, 0.0)
+    assert texts(spool) == ["c", "d", "e"]
+    assert spool.dropped["r"] == 2
+
+
+def test_the_file_does_not_grow_beyond_its_bound(path: str) -> None:
+    made = Spool(path, 50_000, 100.0)
+    for number in range(3000):
+        fill(made, json.dumps({"number": number, "rest": "x" * 100}))
+    made.close(0.0, 0.0)
+    assert os.path.getsize(path) < 200_000
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    steps=st.lists(st.tuples(st.sampled_from(["add", "done", "flush", "again"]), st.sampled_from("rs")), max_size=60)
+)
+def test_whatever_happens_nothing_is_lost_and_the_order_stays(
+    tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[str, str]]
+) -> None:
+    path = str(tmp_path_factory.mktemp("spool") / "s")
+    made, expected = Spool(path, 1 << 30, 1e9), {"r": list[str](), "s": list[str]()}
+    for number, (what, robot) in enumerate(steps):
+        if what == "add":
+            made.add(robot, str(number), 0.0)
+            expected[robot].append(str(number))
+        elif what == "done" and (first := made.after(robot, 0, 1)):
+            made.done(first[0])
+            assert expected[robot].pop(0) == first[0].text
+        elif what == "flush":
+            made.flush(float(number), 0.0)
+        elif what == "again":
+            made.close(float(number), 0.0)
+            made = Spool(path, 1 << 30, 1e9)
+        for name, wanted in expected.items():
+            assert texts(made, name) == wanted
+    made.close(1e6, 0.0)
+    with sqlite3.connect(path) as db:
+        assert db.execute("SELECT count(*) FROM events").fetchone()[0] == sum(map(len, expected.values()))
+    db.close()

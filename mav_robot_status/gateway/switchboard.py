@@ -10,22 +10,19 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..config import Config
 from ..hardware.robot_hw import COMMAND_IDS, WANTED_IDS
-from ..interface import Audience, TriState
-from ..link.record import TlogWriter
+from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
-from ..mavlink.component import LONELY_SYSTEM, Component
 from ..mavlink.decode import decode
 from ..mavlink.signing import Verdict
 from .paths import Paths
 from .routing import Router
 from .station import Station
-from .trust import Trust
+from .voice import Voice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from ..clock import Instant
-    from ..config import SigningConfig
     from ..hardware.robot_hw import Tracked
     from ..mavlink.framing import Frame
     from .station import Channel
@@ -49,9 +46,8 @@ class Switchboard:
 
     def __init__(self, config: Config, clock: Callable[[], Instant]) -> None:
         """Open everything. Raises LinkError, UsageError."""
-        self._clock = clock
         self.config = Config()
-        self.component = Component()
+        self.voice = Voice(clock)
         self.offered: frozenset[int]
         """The messages of ours that can be asked for."""
         self.paths: Paths[Channel] = Paths()
@@ -66,14 +62,12 @@ class Switchboard:
         """Everyone a frame may be passed on to; None: to be found anew."""
         self._router: Router[Channel] | None = None
         self._keep_all = False
-        self._trust: Trust | None = None
-        self._recorder: TlogWriter | None = None
         try:
             self.change(config)
         except BaseException:  # what fails half-way leaves nothing open
             for station in self.stations:
                 station.link.close()
-            self._secure(None)
+            self.voice.close()
             raise
 
     def change(self, config: Config) -> None:
@@ -83,8 +77,6 @@ class Switchboard:
         back.
         """
         before, self.config = self.config, config
-        if config.identity != before.identity:
-            self.component = Component(config.identity.component, config.identity.system)
         self.offered = frozenset({HEARTBEAT} if config.identity.heartbeat else ())
         self._keep_all = config.forward or config.record is not None
         places = [*((link, False) for link in config.links), *((out, True) for out in config.outs)]
@@ -94,8 +86,7 @@ class Switchboard:
         self._let_go(rest)
         if not config.forward or self._router is None or rest:
             self._router = Router() if config.forward else None
-        if config.signing != before.signing:
-            self._secure(config.signing)
+        self.voice.change(config, before)
         for number, ((link, is_out), station) in enumerate(zip(places, kept, strict=True)):
             if station is not None:
                 station.adjust(link, number, keep_all=self._keep_all)
@@ -104,8 +95,6 @@ class Switchboard:
             self.stations.append(station)
             log.info("%s%s", station.link.text, " (passive)" if station.passive else "")
         self.stations.sort(key=lambda station: station.number)
-        if config.record != before.record:
-            self._record(config.record)
 
     def _let_go(self, stations: list[Station]) -> None:
         """Close links, and forget whom was heard there only."""
@@ -120,20 +109,6 @@ class Switchboard:
             for station in stations:
                 steps.callback(station.link.close)
                 steps.callback(_tell_counters, station)
-
-    def _secure(self, config: SigningConfig | None) -> None:
-        former, self._trust = self._trust, None
-        if former is not None:
-            former.close()
-        self._trust = None if config is None else Trust(config, self._clock())
-
-    def _record(self, path: str | None) -> None:
-        former, self._recorder = self._recorder, None
-        if former is not None:
-            former.close()
-        self._recorder = None if path is None else TlogWriter(path)
-        if self._recorder is not None:
-            log.info("%s", self._recorder.text)
 
     # what comes in
 
@@ -168,14 +143,15 @@ class Switchboard:
 
     def _believes(self, frame: Frame, channel: Channel, now: Instant) -> bool:
         """Whether a frame is one that the hardware is to take; what is meant for us is dealt with."""
-        verdict = None if self._trust is None else self._trust.judge(frame, now)
+        trust = self.voice.trust
+        verdict = None if trust is None else trust.judge(frame, now)
         if verdict is not None and verdict not in (Verdict.VERIFIED, Verdict.LET_THROUGH):
-            if frame.message_id == HEARTBEAT and self._trust and self._trust.may_heal(verdict, now.mono):
-                self._send(channel, self.component.heartbeat(frame.system, False, channel.encoders))
+            if frame.message_id == HEARTBEAT and trust and trust.may_heal(verdict, now.mono):
+                self.voice.beat(channel, frame.system)
             return False
         station = channel.station
         if frame.message_id == HEARTBEAT:
-            self.component.heard(frame)
+            self.voice.component.heard(frame)
             if station.is_out:
                 self._heard_at(channel, now.mono)
         elif frame.message_id in COMMAND_IDS:
@@ -216,24 +192,25 @@ class Switchboard:
         hears_statuses = self._hears_statuses(channel.station)
         offered = self.offered if hears_statuses else self.offered - {ROBOT_STATUS}
         sender = frame.system, frame.component
-        found = answer(decode(frame), sender, self.component.speaks_as, channel.interval, offered)
+        found = answer(decode(frame), sender, self.voice.component.speaks_as, channel.interval, offered)
         if found is None:
             return
         for reply in found.replies:
             self.tell(channel, reply, found.system)
         channel.interval = found.interval
         if found.once == HEARTBEAT:
-            self._send(channel, self.component.heartbeat(found.system, False, channel.encoders))
+            self.voice.beat(channel, found.system)
         elif found.once == ROBOT_STATUS:
             vehicles = {system for system, _ in self.paths.vehicles()}
             self.stirred = True
-            self._requests |= {(channel, v) for v in vehicles if self.component.system_for(v) == found.system}
+            self._requests |= {(channel, v) for v in vehicles if self.voice.component.system_for(v) == found.system}
 
     def _pass_on(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant) -> None:
         """Record what came, and send it to whom it concerns."""
-        if self._recorder is not None:
+        recorder = self.voice.recorder
+        if recorder is not None:
             for frame in frames:
-                self._recorder.write(now.unix_us, frame.raw)
+                recorder.write(now.unix_us, frame.raw)
         if self._router is None or not channel.station.is_peer(channel):
             return
         frames = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
@@ -276,47 +253,27 @@ class Switchboard:
 
     def tell(self, channel: Any, message: Any, system: int) -> None:
         """Send one message to one end, under the identity that we have beside this system."""
-        self._send(channel, self.component.frame(message, system, channel.encoders))
-
-    def _send(self, channel: Channel, frame: bytes) -> None:
-        """Send a frame of ours: signed, and recorded."""
-        if self._trust is not None or self._recorder is not None:
-            unix_us = self._clock().unix_us
-            if self._trust is not None:
-                frame = self._trust.sign(frame, unix_us, channel.station.number)
-            if self._recorder is not None and not channel.passive:
-                self._recorder.write(unix_us, frame)
-        channel.send(frame)
+        self.voice.tell(channel, message, system)
 
     def beat(self, vehicles: Iterable[Tracked], now: float) -> None:
-        """Our heartbeat: beside each vehicle heard; alone only where we must speak first."""
+        """Our heartbeat, once a second."""
         for station in self.stations:
             station.forget_silent(now)
         self._ends = None
-        in_error: dict[int, bool] = {}
-        for tracked in vehicles:
-            if tracked.ids is not None:
-                system = self.component.system_for(tracked.ids[0])
-                in_error[system] = in_error.get(system, False) or tracked.handle.status.in_error is TriState.TRUE
-        for station in self.stations:
-            if station.passive or (not in_error and (station.is_out or not station.must_speak)):
-                continue
-            for channel in station.peers():
-                for system, wrong in (in_error or {LONELY_SYSTEM: False}).items():
-                    self._send(channel, self.component.heartbeat(system, wrong, channel.encoders))
+        self.voice.beat_all(self.stations, vehicles)
 
     # keeping the links
 
     @property
     def record_dropped(self) -> int | None:
         """Frames that the recording has not; None: there is no recording."""
-        return None if self._recorder is None else self._recorder.dropped
+        return None if self.voice.recorder is None else self.voice.recorder.dropped
 
     def service(self, now: float) -> None:
         """Connect and reconnect what waits for its turn."""
         self.stirred = False
-        if self._trust is not None:
-            self._trust.keep()
+        if self.voice.trust is not None:
+            self.voice.trust.keep()
         for station in self.stations:
             if now >= station.link.due():
                 station.link.service(now)
@@ -329,8 +286,7 @@ class Switchboard:
         """Close the links, tell in the log what was counted."""
         with ExitStack() as steps:  # each is done, whatever the others raise
             steps.callback(self._close_links, self.stations)
-            steps.callback(self._secure, None)
-            steps.callback(self._record, None)
+            steps.callback(self.voice.close)
         if self.paths.duplicates:
             log.info("%d frames came a second way, %d changes of the way", self.paths.duplicates, self.paths.changes)
 
@@ -341,7 +297,8 @@ class Switchboard:
                 got = station.totals()
                 heard = f"{got.frames} MAVLink frames" if got.frames else "nothing that is MAVLink"
                 log.warning("no autopilot heard yet, %s: %s so far", station.link.text, heard)
-        if self._trust is not None and (found := self._trust.summary()):
+        trust = self.voice.trust
+        if trust is not None and (found := trust.summary()):
             log.warning("signing: %s", found)
 
 

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.config import Config, LinkConfig
 from mav_robot_status.gateway.live import Live
-from mav_robot_status.hardware.robot_hw import WANTED_IDS, MavlinkRobotHW
+from mav_robot_status.hardware.kinds import WANTED_IDS
+from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
 from mav_robot_status.mavlink.framing import Parser
 
 from . import workload

@@ -10,8 +10,9 @@ from mav_robot_status.config.document import parse_document
 from mav_robot_status.config.reader import build
 from mav_robot_status.errors import ConfigError, UsageError
 from mav_robot_status.hardware import statustext
+from mav_robot_status.hardware.kinds import WANTED_IDS
 from mav_robot_status.hardware.options import HardwareOptions
-from mav_robot_status.hardware.robot_hw import WANTED_IDS, MavlinkRobotHW
+from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
 from mav_robot_status.link.url import parse
 from mav_robot_status.mavlink.decode import decode
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext

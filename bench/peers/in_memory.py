@@ -21,7 +21,7 @@ REPEAT: Final = 8  # times over the loop of frames
 
 def parse_ours(pieces: list[bytes], _: str) -> Callable[[], int]:
     """Our parser with what a status needs; loss is tracked, each known frame's CRC checked."""
-    from mav_robot_status.hardware.robot_hw import WANTED_IDS
+    from mav_robot_status.hardware.kinds import WANTED_IDS
     from mav_robot_status.mavlink.framing import Parser
 
     parser = Parser(WANTED_IDS)

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from typing import TextIO
 
     from ..config import Config
-    from ..hardware.robot_hw import MavlinkRobotHW, Tracked
+    from ..hardware.robot_hw import MavlinkRobotHW
+    from ..hardware.tracked import Tracked
     from ..interface import RobotStatus
 
 LISTEN: Final = 5.0

@@ -207,7 +207,7 @@ class Live:
             tracked = self.plant.take(frame, now)
             if tracked is not None and tracked.ids is not None:
                 self.switchboard.heard_vehicle(tracked.ids, channel, now.mono)
-        hw.own_component = self.switchboard.voice.component.id
+        hw.speak_as(self._config.identity.system, self.switchboard.voice.component.id)
         if self.switchboard.conflicts:
             for ids in self.switchboard.conflicts:
                 hw.conflict(ids, now)

@@ -14,7 +14,8 @@ from ..clock import Instant
 from ..config import ControllerConfig, PublisherConfig
 from ..controller import IndustrialRobotStatusController
 from ..errors import ConfigError, MavRobotStatusError
-from ..hardware.robot_hw import MavlinkRobotHW, Slot
+from ..hardware.robot_hw import MavlinkRobotHW
+from ..hardware.tracked import Slot
 from ..interface import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle, LinkState, PublisherContext
 from . import plugins
 from .guard import Guard, GuardedPublisher
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Container, Iterator
 
     from ..config import Config
-    from ..hardware.robot_hw import Tracked
+    from ..hardware.tracked import Tracked
     from ..interface import Detail, MavlinkPort, Metrics, Publisher, RobotStatus
     from ..mavlink.framing import Frame
 
@@ -141,7 +142,7 @@ class Plant:
         check(config)
         slots = [Slot(v.system, v.component, v.handle) for v in config.vehicles]
         self.hw = MavlinkRobotHW(config.hardware, slots, config.identity.component)
-        self.hw.own_system = config.identity.system
+        self.hw.speak_as(config.identity.system, config.identity.component)
         self._controllers = config.controllers or (DEFAULT_CONTROLLER,)
         self._posts: list[_Post] = []
         self._idle: list[_Post] = []

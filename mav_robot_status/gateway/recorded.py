@@ -6,7 +6,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
-from ..hardware.robot_hw import WANTED_IDS
+from ..hardware.kinds import WANTED_IDS
 from ..link.log import Counts, LogReader, timed
 from ..mavlink.framing import Parser
 

@@ -6,7 +6,7 @@ import math
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Final
 
-from ..hardware.robot_hw import WANTED_IDS
+from ..hardware.kinds import WANTED_IDS
 from ..link import open_link
 from ..link.url import parse
 from ..mavlink.framing import Counters, Parser

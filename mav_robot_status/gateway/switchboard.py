@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..config import Config
-from ..hardware.robot_hw import COMMAND_IDS, WANTED_IDS
+from ..hardware.kinds import COMMAND_IDS, WANTED_IDS
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
 from ..mavlink.decode import decode
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from ..clock import Instant
-    from ..hardware.robot_hw import Tracked
+    from ..hardware.tracked import Tracked
     from ..mavlink.framing import Frame
     from .station import Channel
 

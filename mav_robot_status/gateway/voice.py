@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config, SigningConfig
-    from ..hardware.robot_hw import Tracked
+    from ..hardware.tracked import Tracked
     from .station import Channel, Station
 
 log = logging.getLogger(__name__)

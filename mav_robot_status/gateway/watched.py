@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config
-    from ..hardware.robot_hw import Tracked
+    from ..hardware.tracked import Tracked
     from ..mavlink.framing import Frame
     from ..publishers.board import Entry, Transition
 

@@ -8,123 +8,41 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ..interface import (
     DEFAULT_HANDLE_NAME,
     Detail,
-    IndustrialRobotStatusHandle,
     IndustrialRobotStatusInterface,
     LinkState,
     RobotHW,
     RobotStatus,
 )
 from ..mavlink import definitions as mav
-from ..mavlink.decode import decode, text
+from ..mavlink.decode import decode
 from . import causes, horizon, motion
+from .asking import Ask, Asking
 from .derive import derive
 from .fields.inhibits import inhibit
 from .fields.view import named
-from .hearing import HANDLERS, overheard, pass_time
+from .hearing import overheard, pass_time
 from .identity import is_autopilot
+from .kinds import COMMAND_IDS, HEARTBEAT_ID, KINDS
 from .memory import begin
 from .observation import SILENCE
 from .options import HardwareOptions
-from .parameters import Parameters
-from .requests import OUTPUT_WATCH, Requests, wanted_of
+from .tracked import Slot, Tracked
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Iterator, Sequence
+    from collections.abc import Container, Iterator, Sequence
 
     from ..clock import Instant
     from ..mavlink.framing import Frame
-    from .hearing import Handler
-    from .horizon import Matters, Part
     from .memory import Memory
 
 log = logging.getLogger(__name__)
 
 MOST_VEHICLES: Final = 256
-HEARTBEAT_ID: Final = 0
-COMMAND_IDS: Final = frozenset({75, 76})  # COMMAND_INT, COMMAND_LONG: heard from others
-WANTED_IDS: Final = frozenset(d.id for d in mav.MESSAGES.values() if d.type in HANDLERS) | COMMAND_IDS
-
-
-class Kind(NamedTuple):
-    """How the messages of one type are heard."""
-
-    type: type
-    handler: Handler
-    part: Part | None
-    """What it can change of all that matters; None: anything."""
-    motion: Callable[[Memory], motion.Motion] | None
-    """What it may begin or end a while later."""
-
-
-KINDS: Final = {
-    d.id: Kind(d.type, HANDLERS[d.type], horizon.PARTS.get(d.type), horizon.MOTIONS.get(d.type))
-    for d in mav.MESSAGES.values()
-    if d.type in HANDLERS
-}
-
-
-class Slot(NamedTuple):
-    """A vehicle that is expected, and the name of its handle. None: any."""
-
-    system: int | None = None
-    component: int | None = None
-    handle: str = DEFAULT_HANDLE_NAME
-
-
-class Ask(NamedTuple):
-    """A message for the autopilot of one vehicle."""
-
-    system: int
-    component: int
-    message: Any
-
-
-class Tracked:
-    """One vehicle: its handle, and once it was heard its ids and memory."""
-
-    __slots__ = (
-        "boots",
-        "checked",
-        "deadline",
-        "dirty",
-        "handle",
-        "ids",
-        "losses",
-        "memory",
-        "parameters",
-        "requests",
-        "seen",
-        "slot",
-    )
-
-    def __init__(self, slot: Slot) -> None:
-        self.slot = slot
-        self.handle = IndustrialRobotStatusHandle(slot.handle)
-        self.handle.detail = Detail(slot.system, slot.component, link=LinkState.NEVER_SEEN)
-        self.ids: tuple[int, int] | None = None
-        self.memory: Memory | None = None
-        self.requests: Requests | None = None
-        self.parameters: Parameters | None = None
-        self.boots = 0
-        self.losses = 0
-        """How often the link was lost."""
-        self.seen: Matters = {}
-        """What mattered at the last look."""
-        self.dirty = False
-        """Whether it is among those that are stirred."""
-        self.deadline = math.inf
-        """Before this time (monotonic seconds) the status does not change if nothing that matters is heard."""
-        self.checked = -math.inf
-        """Up to when the passing of time is in the status."""
-
-    def matches(self, system: int, component: int) -> bool:
-        """True if this is the place for a newly heard autopilot."""
-        return self.ids is None and self.slot.system in (None, system) and self.slot.component in (None, component)
 
 
 class MavlinkRobotHW(RobotHW):
@@ -135,9 +53,7 @@ class MavlinkRobotHW(RobotHW):
     ) -> None:
         super().__init__()
         self.options = options or HardwareOptions()
-        self.own_component = own_component
-        self.own_system: int | None = None
-        """The system id we speak under; None: that of the vehicle we speak to."""
+        self._asking = Asking(self.options.watch_outputs, own_component)
         self.handles = IndustrialRobotStatusInterface()
         self.register_interface(self.handles)
         # a vehicle that is named exactly comes before one that is not
@@ -154,10 +70,6 @@ class MavlinkRobotHW(RobotHW):
         """The first deadline of all vehicles: when `read` has something to do though nothing is stirred."""
         self.changed = False
         """Whether a status or a detail in a handle is another; whoever looks puts it back."""
-        self._asks_due = math.inf
-        self._ask_anew = True
-        """Whether `write` may have something to do before that: something has changed since it looked."""
-        self._passive: Container[tuple[int, int]] = ()
         self._unheard = True
         """Whether the handles of vehicles that were not heard are still to be told so."""
         self.ignored = 0
@@ -173,6 +85,10 @@ class MavlinkRobotHW(RobotHW):
     def find(self, system: int, component: int) -> Tracked | None:
         """The vehicle with these ids, if it was heard."""
         return self._tracked.get((system, component))
+
+    def speak_as(self, system: int | None, component: int) -> None:
+        """Our ids, which acknowledgements come back to; `system` None: that of the vehicle that is spoken to."""
+        self._asking.own_system, self._asking.own_component = system, component
 
     def take(self, frame: Frame, now: Instant) -> Tracked | None:
         """Take one frame. Returns the vehicle whose autopilot's heartbeat it is, None for everything else."""
@@ -196,7 +112,7 @@ class MavlinkRobotHW(RobotHW):
                 self._stir(tracked)
             return beating
         if beating is None and tracked.requests is not None:
-            self._tell_askers(tracked, tracked.requests, message, message_id, now)
+            self._asking.heard(tracked, message, message_id, now.mono)
         type_, handler, part, moving = kind
         options = self.options
         handler(memory, message, now, options)
@@ -217,7 +133,7 @@ class MavlinkRobotHW(RobotHW):
 
     def is_stirred(self, asks: bool) -> bool:
         """Whether something was taken that `read`, or `write` if it is called at all, should look at now."""
-        return bool(self.stirred) or (asks and self._ask_anew)
+        return bool(self.stirred) or (asks and self._asking.anew)
 
     def read(self, now: Instant) -> None:
         """Set the handles to what is so at `now`."""
@@ -249,31 +165,7 @@ class MavlinkRobotHW(RobotHW):
 
     def write(self, now: Instant, passive: Container[tuple[int, int]] = ()) -> list[Ask]:
         """What is to be asked of the autopilots at `now`; nothing of those on `passive` links."""
-        if now.mono < self._asks_due and not self._ask_anew and passive == self._passive:
-            return []
-        self._passive = passive
-        self._asks_due = math.inf
-        asks = []
-        for ids, tracked in self._tracked.items():
-            memory = tracked.memory
-            if memory is None or ids in passive or tracked.handle.detail.link is not LinkState.CONNECTED:
-                continue
-            if tracked.requests is None:
-                tracked.requests = Requests(*ids, now.mono)
-            wanted = wanted_of(memory.stack, memory.family, self.options.watch_outputs)
-            command = tracked.requests.due(now.mono, wanted, memory.stack)
-            if command is not None:
-                asks.append(Ask(*ids, command))
-            elif OUTPUT_WATCH[0] in wanted:
-                if tracked.parameters is None:
-                    tracked.parameters = Parameters(*ids, now.mono)
-                request = tracked.parameters.due(now.mono)
-                if request is not None:
-                    asks.append(Ask(*ids, request))
-                self._asks_due = min(self._asks_due, tracked.parameters.next_due())
-            self._asks_due = min(self._asks_due, tracked.requests.next_due())
-        self._ask_anew = bool(asks)
-        return asks
+        return self._asking.due(self._tracked, now.mono, passive)
 
     def conflict(self, ids: tuple[int, int], now: Instant) -> None:
         """Two autopilots that claim the ids of this vehicle were heard on different ways."""
@@ -290,7 +182,7 @@ class MavlinkRobotHW(RobotHW):
         """
         if self.deadline < until:
             self._look_again(until)
-        return min(self.deadline, self._asks_due)
+        return min(self.deadline, self._asking.next_due)
 
     def adopt(self, other: MavlinkRobotHW) -> None:
         """Go on with the vehicles of another, as this one's options and slots have it. The other is used no more.
@@ -354,15 +246,6 @@ class MavlinkRobotHW(RobotHW):
         if tracked is not None:
             tracked.handle.heard_at = now.mono
         return tracked
-
-    def _tell_askers(self, tracked: Tracked, requests: Requests, message: Any, kind: int, now: Instant) -> None:
-        """What came need not be asked for."""
-        requests.arrived(kind, now.mono)
-        if type(message) is mav.CommandAck and tracked.ids is not None:
-            requests.acknowledged(message, (self.own_system or tracked.ids[0], self.own_component), now.mono)
-            self._ask_anew = True
-        elif type(message) is mav.ParamValue and tracked.parameters is not None:
-            tracked.parameters.heard(text(message.param_id))
 
     def _discover(self, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant) -> Tracked | None:
         """The place of an autopilot that is heard for the first time."""
@@ -428,13 +311,13 @@ class MavlinkRobotHW(RobotHW):
         log.info("vehicle %d.%d has rebooted", *(tracked.ids or (0, 0)))
         if tracked.requests is not None:
             tracked.requests.restart(now.mono)
-            self._ask_anew = True
+            self._asking.anew = True
 
     def _log_link(self, tracked: Tracked, state: LinkState) -> None:
         before = tracked.handle.detail.link
         if state is before:
             return
-        self._ask_anew = True
+        self._asking.anew = True
         ids = tracked.ids or (0, 0)
         if state is LinkState.LOST and before is LinkState.CONNECTED:
             tracked.losses += 1

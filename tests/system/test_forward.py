@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from mav_robot_status.mavlink.pymavlink_dialect import MAVLink_command_long_message, MAVLink_heartbeat_message
 from mav_robot_status.testing import FakeAutopilot, ardurover
@@ -54,6 +55,10 @@ def test_datagrams_pass_untouched_also_with_kinds_that_we_do_not_know(gateway: S
     assert gate.stop() == 0
 
 
+def of_the_autopilot(system: int) -> Callable[[Any], bool]:
+    return lambda message: (message.get_srcSystem(), message.get_srcComponent()) == (system, 1)
+
+
 def test_a_command_goes_only_where_its_target_was_heard_and_nothing_comes_back(
     gateway: StartGateway, wire: OpenWire
 ) -> None:
@@ -61,7 +66,7 @@ def test_a_command_goes_only_where_its_target_was_heard_and_nothing_comes_back(
     ground = station(wire, gate)
     one, two = wire(gate.address, system=1).beating(), wire(gate.address, system=2).beating()
     for system in (1, 2):
-        ground.wait_for("HEARTBEAT", lambda m, s=system: m.get_srcSystem() == s and m.get_srcComponent() == 1)
+        ground.wait_for("HEARTBEAT", of_the_autopilot(system))
     ground.send(MAVLink_command_long_message(2, 1, ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0))
     two.wait_for("COMMAND_LONG", lambda m: m.command == ARM_DISARM)
     ground.send(MAVLink_heartbeat_message(GCS, INVALID, 0, 5, 4, 3))

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from ...clock import now as present
 from ...errors import LinkError
+from ...hardware.kinds import WANTED_IDS
 from ...hardware.requests import COMMON, LOOK, wanted_of
-from ...hardware.robot_hw import WANTED_IDS
 from ...link.url import parse
 from ...mavlink.component import LONELY_SYSTEM, Component
 from ...mavlink.framing import Parser
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
     from ...clock import Instant
     from ...config import Config, LinkConfig
-    from ...hardware.robot_hw import MavlinkRobotHW, Tracked
+    from ...hardware.robot_hw import MavlinkRobotHW
+    from ...hardware.tracked import Tracked
     from ...link.base import Link, Received
     from ...link.log import Stamped
     from ...mavlink.framing import Counters

@@ -8,8 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bench import workload
-from mav_robot_status.hardware.robot_hw import WANTED_IDS
-from mav_robot_status.link.log import STAMP_SIZE
+from mav_robot_status.hardware.kinds import WANTED_IDS
 from mav_robot_status.mavlink.framing import Parser
 
 
@@ -53,8 +52,8 @@ def test_each_vehicle_of_a_fleet_has_its_own_sequence() -> None:
 def test_a_log_has_the_time_before_each_frame(tmp_path: pathlib.Path) -> None:
     path = tmp_path / "made.tlog"
     workload.write_log(path, 161)
-    parser = Parser(None, STAMP_SIZE)
-    stamps = [int.from_bytes(frame.stamp, "big") for frame in parser.feed(path.read_bytes())]
+    parser = Parser(None, stamped=True)
+    stamps = [frame.stamp for frame in parser.feed(path.read_bytes())]
     assert (len(stamps), stamps[-1] - stamps[0]) == (161, 2_000_000)
 
 

@@ -37,7 +37,7 @@ def test_a_name_nobody_registered_is_an_error_with_the_nearest_one() -> None:
 
 
 def test_a_name_like_no_other_is_an_error_that_lists_what_there_is() -> None:
-    with pytest.raises(ConfigError, match="there are .*'json', .*'mavlink'"):
+    with pytest.raises(ConfigError, match=r"there are .*'json', .*'mavlink'"):
         plugins.load(plugins.PUBLISHERS, "pigeon", "f:3:1")
 
 

@@ -12,7 +12,7 @@ from mav_robot_status.errors import UsageError
 from mav_robot_status.gateway.plant import Plant
 from mav_robot_status.gateway.recorded import Recording
 from mav_robot_status.gateway.replay import Nobody, replay, run_through
-from mav_robot_status.hardware.robot_hw import WANTED_IDS
+from mav_robot_status.hardware.kinds import WANTED_IDS
 from mav_robot_status.link.log import Stamped
 from mav_robot_status.mavlink.definitions import Heartbeat, MessageInterval
 from mav_robot_status.mavlink.encode import encode

@@ -12,7 +12,8 @@ from typing import Any
 from mav_robot_status.clock import Instant
 from mav_robot_status.hardware.derive import derive
 from mav_robot_status.hardware.options import HardwareOptions
-from mav_robot_status.hardware.robot_hw import MavlinkRobotHW, Slot, Tracked
+from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
+from mav_robot_status.hardware.tracked import Slot, Tracked
 from mav_robot_status.interface import Detail, LinkState, RobotStatus, TriState
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.mavlink.framing import Frame

@@ -92,8 +92,9 @@ def test_two_autopilots_that_take_turns_with_the_same_ids_are_a_conflict_until_o
 
 def test_two_clocks_that_come_in_turn_from_one_router_are_a_conflict_and_no_reboots_while_armed() -> None:
     flight = copter().set(armed=True)
-    for name, uptime in (("attitude", 900_000), ("attitude of the other", 0)):
-        flight.stream(name, lambda more=uptime: mav.Attitude(flight.boot_ms + more, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), hz=2)
+    still = mav.Attitude(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    flight.stream("attitude", lambda: still._replace(time_boot_ms=flight.boot_ms + 900_000), hz=2)
+    flight.stream("attitude of the other", lambda: still._replace(time_boot_ms=flight.boot_ms), hz=2)
     doubled = flight.stream("system_time of the other", flight.system_time, hz=2)
     doubled.wait(5)
     assert flight.codes == [9002]

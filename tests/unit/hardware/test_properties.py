@@ -16,11 +16,12 @@ from mav_robot_status.hardware import causes, statustext
 from mav_robot_status.hardware.derive import derive
 from mav_robot_status.hardware.hearing import HANDLERS
 from mav_robot_status.hardware.hearing.modes import MOST_MODES
+from mav_robot_status.hardware.kinds import WANTED_IDS
 from mav_robot_status.hardware.memory import Memory
 from mav_robot_status.hardware.observation import REMEMBERED
 from mav_robot_status.hardware.options import HardwareOptions
 from mav_robot_status.hardware.pulse import RUNS
-from mav_robot_status.hardware.robot_hw import WANTED_IDS, MavlinkRobotHW
+from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
 from mav_robot_status.interface import Detail, IndustrialRobotStatusHandle, RobotMode, RobotStatus
 from mav_robot_status.mavlink import definitions as mav
 

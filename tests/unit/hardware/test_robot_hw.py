@@ -6,7 +6,8 @@ import math
 import pytest
 
 from mav_robot_status.hardware.options import HardwareOptions
-from mav_robot_status.hardware.robot_hw import MOST_VEHICLES, MavlinkRobotHW, Slot
+from mav_robot_status.hardware.robot_hw import MOST_VEHICLES, MavlinkRobotHW
+from mav_robot_status.hardware.tracked import Slot
 from mav_robot_status.interface import LinkState, RobotStatus, TriState
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.testing import ManualClock

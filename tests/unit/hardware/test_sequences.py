@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mav_robot_status.hardware.options import HardwareOptions
-from mav_robot_status.hardware.robot_hw import Slot
+from mav_robot_status.hardware.tracked import Slot
 from mav_robot_status.interface import LinkState, RobotMode, RobotStatus, TriState
 from mav_robot_status.mavlink import definitions as mav
 

@@ -6,8 +6,10 @@ vehicle. Every status on the way is held against the invariants.
 
 from __future__ import annotations
 
+from mav_robot_status.hardware.kinds import WANTED_IDS
 from mav_robot_status.hardware.options import HardwareOptions
-from mav_robot_status.hardware.robot_hw import WANTED_IDS, MavlinkRobotHW, Tracked
+from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
+from mav_robot_status.hardware.tracked import Tracked
 from mav_robot_status.interface import Detail, RobotMode, RobotStatus, TriState
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.framing import Parser

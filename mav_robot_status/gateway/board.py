@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
 from ..publishers.board import Board
-from ..publishers.mqtt.connection import Complaints, Connection
+from ..publishers.mqtt.complaints import Complaints
+from ..publishers.mqtt.connection import Connection
 from ..publishers.mqtt.fleet import Fleet
 from ..publishers.mqtt.loop import Loop
 from ..publishers.web.serve import serve

@@ -13,6 +13,7 @@ from typing import Any, get_args, get_type_hints
 
 import pytest
 
+from mav_robot_status.commands import COMMANDS
 from mav_robot_status.config import Config, IdentityConfig, LinkConfig, SigningConfig, VehicleConfig
 from mav_robot_status.config.model import Or
 from mav_robot_status.config.reader import PARAMETERS
@@ -145,8 +146,7 @@ def _help(*module: str) -> str:
 
 def test_every_option_that_is_mentioned_exists() -> None:
     command = ["mav_robot_status.cli"]
-    subcommands = ("run", "explain", "doctor", "demo", "check-config", "dialect")
-    helps = [_help(*command, name) for name in subcommands] + [_help("fuzz"), _help("bench"), _help("bench.guard")]
+    helps = [_help(*command, name) for name in COMMANDS] + [_help("fuzz"), _help("bench"), _help("bench.guard")]
     for document in DOCUMENTS:
         mentioned = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", document.read_text()))
         assert mentioned - OTHER_TOOLS <= set(re.findall(r"--[a-z-]+", "".join(helps))), document.name

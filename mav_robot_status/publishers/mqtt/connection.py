@@ -2,51 +2,30 @@
 
 from __future__ import annotations
 
-import logging
 import random
-import socket
 import ssl
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from paho.mqtt.client import MQTT_ERR_SUCCESS, Client, MQTTMessage
-from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
-from .options import VERSIONS
+from .client import dial, make, shut
+from .complaints import lost, refusal, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from paho.mqtt.reasoncodes import ReasonCode
 
+    from .client import Will
+    from .complaints import Complaints
     from .options import Broker
-
-log = logging.getLogger(__name__)
 
 FIRST_WAIT, LONGEST_WAIT = 1.0, 30.0  # s between two attempts; doubled each time, and spread
 STEADY: Final = 10.0  # s that a connection has to hold for the next wait to be the first one
 ANSWER: Final = 10.0  # s for a broker to answer
-MOST_IN_FLIGHT: Final = 10
-"""Publications that the broker has not acknowledged, at most; what is more waits in the client. Brokers allow 10 at the
-least (HiveMQ), mosquitto 20."""
 MOST_AT_ONCE: Final = 200  # packets read before others have their turn
-OTHER: Final = "does another gateway publish the same robot there (--mqtt-robot gives each its own name)"
-"""What a broker that throws us out most often means; mosquitto does not say it."""
-REFUSALS: Final = {
-    "Unsupported protocol version": "it does not speak this version of MQTT: try --mqtt-version 3.1.1",
-    "Bad user name or password": "wrong user or password",
-    "Not authorized": "this user, or password, or certificate may not do what is asked",
-    "Session taken over": f"somebody else came under our name; {OTHER}?",
-}
-"""What a broker's reasons mean here."""
-
-
-class Will(NamedTuple):
-    """What the broker says for us when we are gone."""
-
-    topic: str
-    text: str
 
 
 class Owner(Protocol):
@@ -63,33 +42,6 @@ class Owner(Protocol):
 
     def received(self, message: MQTTMessage) -> None:
         """A publication of others."""
-
-
-class Complaints:
-    """One line for each reason, however many connections have it, until one of them is open again."""
-
-    def __init__(self, broker: Broker) -> None:
-        self._broker = broker
-        self._told: set[str] = set()
-        self._worked = False
-
-    def fails(self, reason: str) -> None:
-        """Tell it, once."""
-        if reason not in self._told:
-            self._told.add(reason)
-            log.warning("mqtt: %s: %s; trying again", self._broker.name, reason)
-
-    def opens(self) -> None:
-        """Tell the first time, if nothing was wrong before."""
-        if not (self._told or self._worked):
-            log.info("mqtt: %s: connected", self._broker.name)
-        self._worked = True
-
-    def holds(self) -> None:
-        """A connection has held for a while: what is wrong later is news."""
-        if self._told:
-            log.warning("mqtt: %s: connected again", self._broker.name)
-            self._told.clear()
 
 
 class Connection:
@@ -126,7 +78,7 @@ class Connection:
         """Begin an attempt: what is returned is to be called in another thread, and `dialled` told its result."""
         self.dialling = True
         self._client = client = self._make()
-        return lambda: _dial(client, self._broker)
+        return lambda: dial(client, self._broker)
 
     def dialled(self, reason: str | None, now: float) -> None:
         """The helper thread is done; `reason` is why it could not be."""
@@ -190,46 +142,31 @@ class Connection:
         """End it for good, as it is."""
         self._closed = True
         if self._client is not None and not self.dialling:
-            _shut(self._client)
+            shut(self._client)
             self._client = None
         self.open = False
 
     def _make(self) -> Client:
-        broker = self._broker
-        client = Client(
-            CallbackAPIVersion.VERSION2,
-            self._ident,
-            clean_session=None if broker.version == "5" else True,
-            protocol=VERSIONS[broker.version],  # type: ignore[arg-type]
-            reconnect_on_failure=False,
-        )
-        client.max_inflight_messages_set(MOST_IN_FLIGHT)
-        if broker.tls is not None:
-            client.tls_set_context(broker.tls)
-        if broker.user is not None:
-            client.username_pw_set(broker.user, broker.password)
-        if self._will is not None:
-            client.will_set(self._will.topic, self._will.text, 1, True)
+        client = make(self._broker, self._ident, self._will)
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
-        client.on_publish = lambda c, u, mid, code, p: self._owner.acknowledged(mid, _refusal(code))
+        client.on_publish = lambda c, u, mid, code, p: self._owner.acknowledged(mid, refusal(code))
         client.on_subscribe = lambda c, u, mid, codes, p: self._on_subscribe(mid, codes)
         client.on_message = lambda c, u, message: self._owner.received(message)
         return client
 
     def _on_connect(self, client: Client, data: Any, flags: Any, code: ReasonCode, properties: Any) -> None:
         if code.is_failure:
-            self._reason = f"the broker refuses: {_words(code)}"
+            self._reason = f"the broker refuses: {words(code)}"
         else:
             self.open = True
 
     def _on_disconnect(self, client: Client, data: Any, flags: Any, code: ReasonCode, properties: Any) -> None:
         if flags.is_disconnect_packet_from_server:
-            self._reason = f"the broker ends the connection: {_words(code)}"
+            self._reason = f"the broker ends the connection: {words(code)}"
 
     def _on_subscribe(self, mid: int, codes: list[ReasonCode]) -> None:
-        refused = next((f"{_words(code)}" for code in codes if code.is_failure), None)
-        self._owner.acknowledged(mid, refused)
+        self._owner.acknowledged(mid, next(filter(None, map(refusal, codes)), None))
 
     def _run(self, step: Callable[[], Any], now: float) -> bool:
         """One of paho's steps; False if that was the end of the connection."""
@@ -239,24 +176,13 @@ class Connection:
         except Exception as error:  # whatever a peer's bytes make paho raise
             fine, self._reason = False, f"what comes is no MQTT ({type(error).__name__})"
         if not fine or self._dropped or self._client is None or self._client.socket() is None:
-            self._end(now, self._reason or self._lost())
+            self._end(now, self._reason or lost(self._broker, self.open, self._steady))
             return False
         if self.open and not was_open:
             self._since = now
             self._complaints.opens()
             self._owner.opened()
         return True
-
-    def _lost(self) -> str:
-        if self.open:
-            return (
-                "connection lost"
-                if self._steady
-                else f"connection lost soon after it was made; {OTHER}, or may we not publish there?"
-            )
-        hint = "; does it speak TLS, or want a client certificate?" if self._broker.tls is None else ""
-        wants = "; does it want a client certificate (--mqtt-cert)?" if self._broker.tls is not None else ""
-        return f"the broker hangs up before it answers{hint}{wants}"
 
     def _more(self) -> bool:
         """Whether TLS has decrypted more than was read."""
@@ -266,7 +192,7 @@ class Connection:
     def _end(self, now: float, reason: str) -> None:
         client, self._client = self._client, None
         if client is not None:
-            _shut(client)
+            shut(client)
         self._due = now + self._wait * random.uniform(0.7, 1.3)
         self._wait = min(2 * self._wait, LONGEST_WAIT)
         was_open, self.open, self._since = self.open, False, None
@@ -276,41 +202,3 @@ class Connection:
             self._complaints.fails(reason)
         if was_open:
             self._owner.lost()
-
-
-def _dial(client: Client, broker: Broker) -> str | None:
-    """Open the connection; why it cannot be."""
-    try:
-        client.connect(broker.host, broker.port, broker.keepalive)
-        sock: Any = client.socket()
-        if sock is not None:
-            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, broker.keepalive * 1000)
-    except ssl.SSLCertVerificationError as error:
-        own = "; --mqtt-ca FILE names the authority to believe" if "issuer" in error.verify_message or (
-            "self" in error.verify_message) else ""  # fmt: skip
-        return f"its certificate is not believed: {error.verify_message}{own}"
-    except ssl.SSLError as error:
-        return f"no TLS with it ({error.reason or error})"
-    except socket.gaierror:
-        return "the name is not known"
-    except TimeoutError:
-        return "no answer"
-    except OSError as error:
-        return error.strerror or str(error)
-    except Exception as error:  # whatever paho raises for an answer that is none
-        return f"{type(error).__name__}: {error}"
-    return None
-
-
-def _shut(client: Client) -> None:
-    sock = client.socket()
-    if sock is not None:
-        sock.close()
-
-
-def _refusal(code: ReasonCode) -> str | None:
-    return _words(code) if code.is_failure else None
-
-
-def _words(code: ReasonCode) -> str:
-    return REFUSALS.get(str(code), str(code))

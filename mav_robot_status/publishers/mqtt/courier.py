@@ -9,7 +9,7 @@ import threading
 from collections import Counter, deque
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from .connection import Complaints
+from .complaints import Complaints
 from .lines import event_of, line_of
 from .loop import Loop
 from .robot import Robot

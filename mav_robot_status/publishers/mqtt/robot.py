@@ -7,14 +7,15 @@ import json
 from typing import TYPE_CHECKING, Final
 
 from ...clock import rfc3339
-from .connection import Connection, Will
+from .client import Will
+from .connection import Connection
 from .lines import unknown
 
 if TYPE_CHECKING:
     from paho.mqtt.client import MQTTMessage
 
     from ...clock import Instant
-    from .connection import Complaints
+    from .complaints import Complaints
     from .options import Broker
     from .spool import Event, Spool
 

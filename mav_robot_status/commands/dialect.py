@@ -1,0 +1,22 @@
+"""Write the dialect's files, for other programs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import argparse
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Where to."""
+    parser.add_argument("-o", "--output", metavar="DIR", default=".", help="folder to write to (this one)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """The names of the files on standard output."""
+    from ..mavlink.dialect_files import write_files
+
+    for path in write_files(options.output):
+        print(path)  # noqa: T201
+    return 0

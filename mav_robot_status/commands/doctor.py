@@ -1,0 +1,38 @@
+"""Why is there no status?"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..link.url import parse
+from .options import connections, looking, seconds
+from .overrides import configured
+
+if TYPE_CHECKING:
+    import argparse
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What to listen to, and how long."""
+    connections(parser, "what to listen to")
+    parser.add_argument(
+        "--seconds", type=seconds, metavar="S", default=5.0, help="listen so long, from the first heartbeat on (5)"
+    )
+    parser.add_argument("--as-json", action="store_true", help="as JSON, one object for each connection")
+    looking(parser, "never send anything on the connections")
+
+
+def run(options: argparse.Namespace) -> int:
+    """0: a status can be had on every connection, 1: not."""
+    from ..gateway.doctor.listen import examine
+    from ..gateway.doctor.report import as_json, as_text
+
+    config = configured(options)
+    for link in config.links:  # what is no connection shows now, before the first is listened to
+        parse(link.url)
+    ok = True
+    for link in config.links:
+        found, diagnosis = examine(config, link, options.seconds)
+        ok = ok and diagnosis.ok
+        print(as_json(found, diagnosis) if options.as_json else as_text(found, diagnosis), flush=True)  # noqa: T201
+    return 0 if ok else 1

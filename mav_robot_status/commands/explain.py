@@ -1,0 +1,40 @@
+"""Why each field has its value, now or at a moment of a log."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from ..errors import NothingHeardError, UsageError
+from ..link.url import parse
+from .options import connections, looking
+from .overrides import configured
+
+if TYPE_CHECKING:
+    import argparse
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What to explain, and when."""
+    connections(parser)
+    parser.add_argument("--at", metavar="TIME", help="moment of a log: 2026-11-20T18:49:07Z, or +44 (seconds)")
+    parser.add_argument("--as-json", action="store_true", help="as JSON, one object for each vehicle")
+    looking(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """A table, or JSON, on standard output."""
+    from ..gateway.explain import as_json, as_table, explain_live, explain_log
+
+    config = configured(options)
+    urls = [parse(link.url) for link in config.links]
+    if len(urls) == 1 and urls[0].kind == "log":
+        found = explain_log(config, urls[0].device, options.at)
+    elif options.at is not None:
+        raise UsageError("--at is a moment of a recorded log; a live connection is explained now")
+    else:
+        found = explain_live(config, sys.stdout)
+    if not found:
+        raise NothingHeardError("no autopilot was heard, so there is nothing to explain")
+    print(as_json(found) if options.as_json else as_table(found))  # noqa: T201
+    return 0

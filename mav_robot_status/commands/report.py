@@ -1,0 +1,63 @@
+"""Recorded logs as a picture, or added up as JSON."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from .. import __version__
+from ..errors import NothingHeardError
+from . import PROGRAM
+from .options import system, verbosity
+from .overrides import loaded, only
+
+if TYPE_CHECKING:
+    import argparse
+
+    from ..config import Config
+    from ..views.timeline import Timeline
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Which logs, and where the picture goes."""
+    parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log (.tlog)")
+    parser.add_argument("-o", "--output", metavar="FILE.html", help="where to write (the log's name with .html, here)")
+    parser.add_argument("--as-json", action="store_true", help="totals and intervals as JSON instead, or besides -o")
+    parser.add_argument("--config", metavar="FILE", help="configuration (YAML)")
+    parser.add_argument("--system", type=system, metavar="N", help="only the vehicle with this system id")
+    verbosity(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """The name of the file that was written, or JSON, on standard output."""
+    from ..views.report import as_html, as_json, save
+
+    config = loaded(options)
+    if options.system is not None:
+        config = only(config, options.system)
+    timelines = [_timeline(config, path) for path in options.logs]
+    if not any(timeline.vehicles for timeline in timelines):
+        raise NothingHeardError("no autopilot was heard, so there is nothing to show")
+    if options.as_json:
+        print(as_json(timelines))  # noqa: T201
+    if options.output or not options.as_json:
+        output = options.output or f"{os.path.splitext(timelines[0].name)[0]}.html"
+        save(as_html(timelines, f"{PROGRAM} {__version__}"), output)
+        if not options.as_json:
+            print(output)  # noqa: T201
+    return 0
+
+
+def _timeline(config: Config, path: str) -> Timeline:
+    from ..gateway.report import watch
+    from ..views.progress import ProgressLine
+    from ..views.timeline import TimelineBuilder
+
+    builder = TimelineBuilder(os.path.basename(path))
+    with contextlib.closing(ProgressLine(sys.stderr, f"reading {builder.timeline.name}")) as progress:
+        summary = watch(config, path, builder, progress)
+    logging.getLogger(__name__).info("%s", summary)
+    return builder.timeline

@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import pytest
+
+from .said import said
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "value"),
+    [
+        ("run", "--rate", "nan"),
+        ("run", "--rate", "inf"),
+        ("run", "--rate", "x"),
+        ("run", "--system", "0"),
+        ("run", "--system", "1.5"),
+        ("run", "--baud", "-1"),
+        ("doctor", "--seconds", "0"),
+        ("doctor", "--seconds", "nan"),
+    ],
+)
+def test_numbers_that_make_no_sense_are_usage_errors(
+    name: str, option: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        said(name, option, value)
+    assert ended.value.code == 2
+    assert repr(value) in capsys.readouterr().err
+
+
+def test_numbers_that_do_are_taken() -> None:
+    options = said("run", "--rate", "2.5", "--system", "255", "--baud", "921600")
+    assert (options.rate, options.system, options.baud) == (2.5, 255, 921600)

@@ -29,6 +29,8 @@ from mav_robot_status.publishers.json_lines import native_body
 
 from .documents import DOCUMENTS, ROOT, blocks, prose, table
 
+WHOLE = ("gateway", "views", "hardware", "publishers", "interface")
+"""Folders of which the picture of the house shows every part."""
 OTHER_TOOLS = {"--dialect", "--check", "--reference"}  # options of MAVProxy, ruff and chown
 
 
@@ -168,6 +170,7 @@ def test_the_picture_of_the_house_shows_what_there_is() -> None:
     picture = next(block for block in blocks("text") if block.document.name == "architecture.md").code
     folder: pathlib.Path | None = None
     top = set()
+    drawn: dict[str, str] = {}
     for line in picture.splitlines()[1:]:
         found = re.match(r"(│   )?[├└]── (\S+)", line)
         assert found, line
@@ -178,7 +181,11 @@ def test_the_picture_of_the_house_shows_what_there_is() -> None:
             path = folder = ROOT / "mav_robot_status" / found[2]
             top.add(found[2].rstrip("/"))
         assert path.exists(), line
+        drawn[folder.name] = drawn.get(folder.name, "") + line
         for file in re.findall(r"\b\w+\.py\b", line.partition(found[2])[2]):
             assert (folder / file).exists() or (ROOT / "dialects" / file).exists(), line
     there_is = {p.name for p in (ROOT / "mav_robot_status").iterdir() if p.suffix in ("", ".py") and p.name[0] != "_"}
     assert top == there_is
+    for name in WHOLE:
+        parts = {p.name for p in (ROOT / "mav_robot_status" / name).iterdir() if p.name[0] != "_"} - {"assets"}
+        assert {part for part in parts if part not in drawn[name]} == set(), name

@@ -14,6 +14,15 @@ from mav_robot_status.mavlink.signing import Signer
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parent / "config"
 
+RARE = b"""links: [{url: "tcp:127.0.0.1:5760", robot_status: true}]
+signing: {key_file: key, accept_unsigned: none, link_id: 7}
+forward: true
+record: flight.tlog
+coalesce: 10 ms
+requests: none
+"""
+"""The keys that no example uses."""
+
 
 def write(target: str, entries: list[bytes]) -> None:
     """One file for each entry."""
@@ -49,7 +58,7 @@ def main() -> None:
     write("messages", [b"".join(story), rng.randbytes(2000), b"".join(story[:9]) + rng.randbytes(600)])
     text = encode(Statustext(2, b"PreArm: Compass not calibrated", 7, 1), system=1, component=1, sequence=0)
     write("texts", [b"".join(bytes([20, 3, n % 4, n]) + text[10:30] for n in range(12)), rng.randbytes(500)])
-    write("configuration", [path.read_bytes() for path in sorted(EXAMPLES.glob("*.yaml"))])
+    write("configuration", [*(path.read_bytes() for path in sorted(EXAMPLES.glob("*.yaml"))), RARE])
     forms = [form for kind in KINDS for form in kind.forms.split()]
     write("connection", [kind.example.encode() for kind in KINDS] + [form.encode() for form in forms])
 

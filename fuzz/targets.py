@@ -28,7 +28,7 @@ LONGEST_LINE: Final = 2000
 
 
 def framing(data: bytes) -> int:
-    """Bytes as they come: nothing raises, little is kept, every byte is a frame's, garbage, or waits."""
+    """Bytes as they come: nothing raises, little is kept, no byte is counted twice. A unit is a frame, good or bad."""
     for wanted in (WANTED_IDS, None):
         parser = Parser(wanted)
         taken = 0
@@ -37,10 +37,11 @@ def framing(data: bytes) -> int:
                 decode(frame)
                 taken += len(frame.raw)
             assert parser.pending <= MAX_FRAME
-        whole = Parser(wanted)
-        whole.feed(data)
         assert taken + parser.pending + parser.counters.garbage_bytes <= len(data)
-    return data.count(b"\xfd") + data.count(b"\xfe") or 1
+    counters = parser.counters
+    return (
+        counters.frames + counters.incompatible + sum(counters.bad_crc.values()) + sum(counters.unknown.values()) or 1
+    )
 
 
 def messages(data: bytes) -> int:

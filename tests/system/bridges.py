@@ -11,10 +11,11 @@ import select
 import socket
 import threading
 import tty
+from abc import ABC, abstractmethod
 from pathlib import Path
 
 
-class Bridge:
+class Bridge(ABC):
     """Bytes from a UDP socket to a stream and back, in a thread."""
 
     def __init__(self) -> None:
@@ -50,21 +51,25 @@ class Bridge:
         self.cut()
         self._udp.close()
 
+    @abstractmethod
     def _open(self) -> None:
-        raise NotImplementedError
+        """Make the stream."""
 
+    @abstractmethod
     def _close(self) -> None:
-        raise NotImplementedError
+        """End it, if there is one."""
 
+    @abstractmethod
     def _ends(self) -> list[int]:
         """Descriptors on which something may come."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _read(self, end: int) -> bytes:
-        raise NotImplementedError
+        """What has come on one end."""
 
+    @abstractmethod
     def _write(self, data: bytes) -> None:
-        raise NotImplementedError
+        """Send, if there is a stream."""
 
     def _run(self) -> None:
         while not self._stop.is_set():

@@ -50,7 +50,7 @@ def seconds(found: list[Stamped]) -> list[int]:
 
 
 def numbers(found: list[Stamped]) -> list[int]:
-    return [int.from_bytes(stamped.what.payload[:4], "little") for stamped in found if stamped.what is not None]
+    return [stamped.what.message.custom_mode for stamped in found if stamped.what is not None]
 
 
 def test_each_frame_comes_at_its_time_and_the_end_at_the_last(recording: Write) -> None:

@@ -288,6 +288,8 @@ class MavlinkRobotHW(RobotHW):
         if memory.boots != tracked.boots:
             self._tell_reboot(tracked, memory, now)
         pass_time(memory, now, self.options)
+        motion.settle(memory.motion, now.mono)
+        motion.settle(memory.gps_motion, now.mono)
         handle = tracked.handle
         derived = derive(memory, tracked.ids, handle.detail, now, self.options)
         self._log_link(tracked, derived.detail.link)

@@ -40,7 +40,10 @@ LATE = 240  # a gap this long is a frame that came up to 16 places late, or twic
 NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; looking it up is quicker than counting
 STAMP = Struct(">Q").unpack_from  # microseconds since 1970
 STAMP_SIZE: Final = 8
-MAGIC = re.compile(b"[\xfd\xfe]")
+_IDS_V1 = b"".join(re.escape(bytes((message_id,))) for message_id in CRC_EXTRA if message_id < 256)
+_HIGH_V2 = b"".join(re.escape(bytes((high,))) for high in {message_id >> 16 for message_id in CRC_EXTRA})
+MAGIC = re.compile(b"\xfe(?=.{4}[%b]|.{0,4}\\Z)|\xfd(?=.{8}[%b]|.{0,8}\\Z)" % (_IDS_V1, _HIGH_V2), re.DOTALL)
+"""Where a frame of a known id may start, as far as the bytes behind it tell."""
 VALID, OPEN, WRONG = range(3)
 new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
 

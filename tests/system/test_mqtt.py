@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import re
 import select
+import shutil
 import signal
 import socket
 import subprocess
@@ -311,21 +313,60 @@ def test_a_broker_that_is_away_for_a_while_gets_every_event_in_order(
     assert len([line for line in gateway.log if "trying again" in line]) <= 2, gateway.log
 
 
-def test_a_gateway_that_is_killed_leaves_its_events_to_the_next(broker: Start, listener: Start, feeder: Start) -> None:
-    at = broker()
-    at.stop()
-    killed = feeder(at.url, "--rate", "100", "--seconds", "60")
-    killed.wait_for(300)
-    killed.process.send_signal(signal.SIGKILL)
-    killed.end()
-    at.start()
+def test_of_a_thousand_changes_none_is_lost_though_gateways_are_killed_and_the_broker_is_stopped(
+    broker: Start, listener: Start, feeder: Start
+) -> None:
+    at = broker(memory=True)
     heard = listener(at.port)
-    feeder(at.url, "--rate", "1", "--robots", "1")
-    told = heard.wait(lambda: len(found := changes(heard.of("events"))) > 298 and found, 20)
-    beginning = told.index(1, 1) if 1 in told[1:] else len(told)
-    of_killed = told[:beginning]
-    assert of_killed == list(range(1, len(of_killed) + 1))
-    assert len(killed.told) - len(of_killed) <= 3  # the last hundredths of a second before the kill
+    told: list[list[int]] = []
+    for number in range(5):
+        if number == 1:
+            at.stop()
+        killed = feeder(at.url, "--rate", "100", "--seconds", "60")
+        killed.wait_for(200)
+        killed.process.send_signal(signal.SIGKILL)
+        killed.end()
+        told.append(killed.told)
+        if number == 3:
+            at.start()
+    last = feeder(at.url, "--rate", "1", "--changes", "1", "--seconds", "60")
+    last.wait_for(1)
+    assert sum(map(len, told)) >= 1000
+    assert last.end()["waiting"] == 0
+    heard.wait(lambda: len(sessions(heard)) == 6)
+    for session, changes_told in zip(sessions(heard), told, strict=False):
+        assert session[: len(changes_told)] == changes_told  # the last of all may be one that was not told any more
+        assert len(session) <= len(changes_told) + 1
+
+
+def sessions(heard: Listener) -> list[list[int]]:
+    """The changes of each start of a gateway, in the order of the starts."""
+    events = heard.of("events")
+    begun = dict.fromkeys(json.loads(h.text)["session"] for h in events)
+    return [changes([h for h in events if json.loads(h.text)["session"] == session]) for session in begun]
+
+
+def test_every_line_that_a_gateway_wrote_before_it_was_killed_has_its_event(
+    broker: Start, listener: Start, gateway: Start, started: Start, wire: Start, tmp_path: Path
+) -> None:
+    at = broker(memory=True)
+    heard = listener(at.port)
+    told = set[str]()
+    for number in range(6):
+        killed = gateway(
+            *("udp:127.0.0.1:0", "--changes-only", "--mqtt", at.url, "--mqtt-robot", "rover-{system}"),
+            *("--mqtt-spool", str(tmp_path / "spool.sqlite"), "--mqtt-keepalive", str(KEEPALIVE)),
+        )
+        rover = wire(killed.address)
+        for count in range(3 + number):
+            rover.beat(custom_mode=10 * (count % 2))
+            killed.wait_for(lambda line, seq=count: line["seq"] == seq)
+        killed.process.kill()  # a fraction of a millisecond after the last line
+        killed.wait_for_end()
+        told |= {line.status["stamp"] for line in killed.lines}
+    started(at.url)
+    assert len(told) >= 33
+    heard.wait(lambda: not told - {json.loads(h.text)["stamp"] for h in heard.of("events")})
 
 
 def test_a_network_that_is_cut_costs_no_event_and_is_noticed_on_both_sides(
@@ -369,10 +410,68 @@ def test_a_full_disk_loses_nothing_while_memory_holds(
         assert len([line for line in gateway.log if "takes no events" in line]) == 1, gateway.log
 
 
+def test_a_gateway_that_is_killed_while_the_disk_is_full_leaves_its_events_all_the_same(
+    broker: Start, listener: Start, feeder: Start, tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    with _small(disk, "2m") as full:
+        at = broker()
+        at.stop()
+        killed = feeder(at.url, "--rate", "100", "--seconds", "60", spool=disk / "s.sqlite")
+        killed.wait_for(100)
+        full()
+        killed.wait_for(500)
+        killed.process.kill()
+        killed.end()
+        at.start()
+        heard = listener(at.port)
+        feeder(at.url, "--rate", "1", "--events", "0", "--seconds", "60", spool=disk / "s.sqlite")
+        heard.wait(lambda: sessions(heard) and len(sessions(heard)[0]) >= len(killed.told), 20)
+        assert sessions(heard)[0][: len(killed.told)] == killed.told
+        assert any("takes no events" in line for line in killed.log), killed.log
+
+
+def test_a_disk_that_hangs_does_not_hold_up_the_gateway(
+    broker: Start, listener: Start, feeder: Start, tmp_path: Path
+) -> None:
+    with _freezable(tmp_path) as (disk, freeze):
+        at = broker()
+        heard = listener(at.port)
+        gateway = feeder(at.url, "--rate", "100", "--changes", "400", "--seconds", "60", spool=disk / "s.sqlite")
+        gateway.wait_for(100)
+        freeze("-f")
+        before = time.monotonic()
+        gateway.wait_for(len(gateway.told) + 100)
+        assert time.monotonic() - before < 2.0  # it goes on at its own rate
+        freeze("-u")
+        assert gateway.end()["dropped"] == 0
+        heard.wait(lambda: changes(heard.of("events")) == gateway.told)
+        assert len([line for line in gateway.log if "the disk takes nothing" in line]) == 1, gateway.log
+
+
 @contextlib.contextmanager
-def _small(folder: Path) -> Iterator[Callable[[], None]]:
-    """A disk of 300 kB; what is given fills it."""
-    mount = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(folder)], capture_output=True)
+def _freezable(folder: Path) -> Iterator[tuple[Path, Callable[[str], object]]]:
+    """A disk on which every write waits from `-f` to `-u`."""
+    image, disk = folder / "image", folder / "disk"
+    disk.mkdir()
+    with image.open("wb") as file:
+        file.truncate(20_000_000)
+    for command in (["mkfs.ext4", "-q", str(image)], ["mount", "-o", "loop", str(image), str(disk)]):
+        if shutil.which(command[0]) is None or subprocess.run(command, capture_output=True, check=False).returncode:
+            pytest.skip("mounting is not permitted here")
+    freeze = functools.partial(subprocess.run, check=False, timeout=30)
+    try:
+        yield disk, lambda what: freeze(["fsfreeze", what, str(disk)])
+    finally:
+        freeze(["fsfreeze", "-u", str(disk)], capture_output=True)
+        freeze(["umount", "-l", str(disk)])
+
+
+@contextlib.contextmanager
+def _small(folder: Path, size: str = "300k") -> Iterator[Callable[[], None]]:
+    """A small disk; what is given fills it."""
+    mount = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)], capture_output=True)
     if mount.returncode:
         pytest.skip("mounting is not permitted here")
 

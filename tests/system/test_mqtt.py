@@ -29,6 +29,7 @@ from .mqtt_fleet import measure, vehicles
 
 pytestmark = pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
 
+DOCUMENT = Path(__file__).parents[2] / "docs" / "mqtt.md"
 ROBOT = "rover-1"
 KEEPALIVE = 2
 WILL = 1.5 * KEEPALIVE + 7
@@ -339,9 +340,46 @@ def test_tls_with_a_client_certificate_and_a_password_from_the_environment(
     assert "horse" not in Path(f"/proc/{gateway.process.pid}/cmdline").read_text()
 
 
-def _passwords(folder: Path) -> str:
+def test_the_commands_of_the_document_bring_a_robot_over_tls_to_the_board(
+    broker: Start,
+    gateway: Start,
+    autopilot: Start,
+    certificates: Certificates,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    block = re.search(r"```text\n(mav-robot-status .*?)```", DOCUMENT.read_text(), re.DOTALL)
+    assert block is not None
+    at = broker("allow_anonymous false", _passwords(tmp_path, "rover", "board"), *certificates.lines())
+    (tmp_path / "password").write_text("correct horse")
+    (tmp_path / "password").chmod(0o600)
+    for there, here in (("ca.pem", "ca.pem"), ("rover.pem", "client.pem"), ("rover.key", "client.key")):
+        shutil.copy(certificates[here], tmp_path / there)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    http = free_port()
+    text = block[1].replace("broker.example", f"localhost:{at.port}").replace("8765", str(http)).replace(":14550", ":0")
+    publishing, showing = (line.split()[1:] for line in text.replace("\\\n", "").splitlines())
+    first = gateway(*publishing)
+    autopilot(ardurover.READY, first.address)
+    monkeypatch.setenv("MAV_ROBOT_STATUS_MQTT_PASSWORD", "correct horse")
+    monkeypatch.setenv("SSL_CERT_FILE", certificates["ca.pem"])  # one of the system's authorities
+    gateway(*showing)
+    eventually(lambda: [line["mode"] for line in served(http)] == ["MANUAL"])
+
+
+def served(http: int) -> list[dict[str, Any]]:
+    """What a board shows; nothing while it starts."""
+    with contextlib.suppress(OSError):
+        return vehicles(http)
+    return []
+
+
+def _passwords(folder: Path, *users: str) -> str:
     path = folder / "passwords"
-    subprocess.run(["mosquitto_passwd", "-b", "-c", str(path), "rover", "correct horse"], check=True, timeout=30)
+    path.touch()
+    for user in users or ("rover",):
+        subprocess.run(["mosquitto_passwd", "-b", str(path), user, "correct horse"], check=True, timeout=30)
     return f"password_file {path}"
 
 
@@ -625,6 +663,16 @@ def test_a_board_without_its_broker_says_so(broker: Start, board: Start, feeder:
     eventually(lambda: shown(http, "robot0")["mode"] == "UNKNOWN", KEEPALIVE + 2)
 
 
+def test_a_board_that_hears_nobody_says_once_why_that_may_be(broker: Start, gateway: Start, tmp_path: Path) -> None:
+    rights = tmp_path / "rights"
+    rights.write_text("topic read elsewhere\n")
+    at = broker(f"acl_file {rights}")  # mosquitto lets us subscribe all the same, and passes on nothing
+    shown = gateway("board", at.url, "--http", f"127.0.0.1:{free_port()}")
+    shown.wait_for_log(f"nothing below {PREFIX}/ so far: is no gateway there, or may we not read it")
+    time.sleep(1)
+    assert len([line for line in shown.log if "so far" in line]) == 1
+
+
 def test_two_hundred_robots_on_one_board(tmp_path: Path) -> None:
     found = measure(200, 2, 4.0, tmp_path)
     assert (found["live_on_the_board"], found["events_missing"]) == (200, 0)
@@ -644,6 +692,7 @@ def test_two_hundred_robots_on_one_board(tmp_path: Path) -> None:
         pytest.param(["mutual"], ["--mqtt-ca", "ca.pem"], "client certificate", id="no client certificate"),
         pytest.param(["forbidden"], [], "may not do what is asked", id="forbidden will"),
         pytest.param(["no events"], [], "does not let us publish", id="forbidden events"),
+        pytest.param(["plain"], ["--mqtt-ca", "ca.pem"], "does it speak TLS on this port", id="no TLS"),
         pytest.param(["nobody"], [], "Connection refused", id="no broker"),
     ],
 )
@@ -672,18 +721,21 @@ def test_what_is_wrong_is_one_line_and_tried_again_without_hurry(
         "mutual": (*certificates.lines(), f"cafile {certificates['ca.pem']}", "require_certificate true"),
         "forbidden": (f"acl_file {rights}",),
         "no events": (f"acl_file {rights}",),
+        "plain": (),
         "nobody": (),
     }
-    at = broker(*kinds[lines[0]])
+    log = tmp_path / "broker.log"
+    at = broker(*kinds[lines[0]], f"log_dest file {log}")
     if lines == ["nobody"]:
         at.stop()
     files = {name: certificates[name] for name in ("ca.pem", "other.pem")} | {"WRONG": str(wrong)}
-    secure = lines[0] in ("tls", "expired", "mutual")
+    secure = lines[0] in ("tls", "expired", "mutual", "plain")
     gateway = started(at.tls_url if secure else at.url, "--system", "1", *(files.get(word, word) for word in more))
     gateway.wait_for_log(says)
-    used = gateway.cpu()
+    used, tried = gateway.cpu(), log.read_text().count("New connection")
     time.sleep(4)
     assert gateway.cpu() - used < 0.5
+    assert lines == ["nobody"] or 1 <= log.read_text().count("New connection") - tried <= 3  # after 1 s, 2 s, ...
     complaints = [line for line in gateway.log if "trying again" in line]
     assert len(complaints) == 1, gateway.log
     assert "swordfish" not in "".join(gateway.log)

@@ -544,7 +544,7 @@ def test_a_disk_that_hangs_does_not_hold_up_the_gateway(
         freeze("-u")
         assert gateway.end()["dropped"] == 0
         heard.wait(lambda: changes(heard.of("events")) == gateway.told)
-        assert len([line for line in gateway.log if "the disk takes nothing" in line]) == 1, gateway.log
+        assert len([line for line in gateway.log if "the disk took no event within" in line]) == 1, gateway.log
 
 
 @contextlib.contextmanager

@@ -27,8 +27,9 @@ log = logging.getLogger(__name__)
 
 SIZE: Final = 1 << 20
 """Bytes of the file, taken from the disk at the start: a full one does not matter then."""
-LONGEST: Final = 0.05
-"""Seconds for which a disk that takes nothing holds up the gateway; once, and again after it took something."""
+LONGEST: Final = 0.2
+"""Seconds for which a disk that takes nothing, or a computer too busy for the thread, holds up the gateway; once, and
+again after everything was taken."""
 MOST_ASKED: Final = 10_000
 """Events that wait for such a disk."""
 CLOSING: Final = 1.0  # s to wait for the thread
@@ -71,7 +72,10 @@ class Journal:
         if self._behind is None and done.acquire(timeout=LONGEST):
             return
         if self._behind is None:
-            log.warning("mqtt: %s: the disk takes nothing; a kill would lose what waits in memory", self._path)
+            log.warning(
+                "mqtt: %s: the disk took no event within %g s; until it does, those that wait in memory would not "
+                "outlive a kill", self._path, LONGEST,
+            )  # fmt: skip
         self._late += 1
         self._behind = done
 
@@ -86,7 +90,7 @@ class Journal:
         if not self._thread.is_alive():  # else it has the file
             os.close(self._fd)
         if unsure := self._late + self._refused:
-            log.warning("mqtt: of %d events others were told before they were on the disk", unsure)
+            log.warning("mqtt: %d events were told to others before they were on the disk", unsure)
 
     def _run(self) -> None:
         while (asked := self._asked.get()) is not None:

@@ -154,4 +154,4 @@ class Courier:
     def _flush(self) -> None:
         now = self._clock()
         self._spool.flush(now.mono, now.unix_us / 1e6)
-        self._journal.forget(self._spool.last)
+        self._journal.forget(self._spool.settled)

@@ -80,7 +80,7 @@ class Journal:
         self._behind = done
 
     def forget(self, place: float) -> None:
-        """The spool has the events up to this place."""
+        """Up to this place no event is needed any more."""
         self._taken = place
 
     def close(self) -> None:

@@ -80,6 +80,11 @@ class Spool:
         return list(dict.fromkeys([*written, *(event.robot for event in self._unwritten)]))
 
     @property
+    def settled(self) -> int:
+        """The place up to which every event is on the disk, delivered or dropped."""
+        return self._unwritten[0].place - 1 if self._unwritten else self._place
+
+    @property
     def waiting(self) -> int:
         """How many events wait."""
         return max(0, self._written + len(self._unwritten) - len(self._finished))

@@ -154,14 +154,18 @@ def test_while_the_disk_is_full_events_wait_in_memory(spool: Spool, caplog: pyte
     fill(spool, "b" * 8000)
     fill(spool, "c", now=2 * RETRY)
     assert spool.failed
+    assert (spool.last, spool.settled) == (1, 1)
     assert [text[0] for text in texts(spool)] == ["a", "b", "c"]
     for event in spool.after("r", 0, 2):
         spool.done(event)
     assert texts(spool) == ["c"]
-    spool._db.execute("PRAGMA max_page_count = 100000")
+    add(spool, "d" * 8000)
     spool.flush(4 * RETRY, 0.0)
+    assert (spool.last, spool.settled) == (1, 2)  # the second was delivered, and never on the disk
+    spool._db.execute("PRAGMA max_page_count = 100000")
+    spool.flush(6 * RETRY, 0.0)
     assert not spool.failed
-    assert (texts(spool), spool.waiting) == (["c"], 1)
+    assert ([text[0] for text in texts(spool)], spool.waiting, spool.settled) == (["c", "d"], 2, 4)
     assert len([r for r in caplog.records if r.levelno == logging.WARNING]) == 2
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import secrets
 import signal
 from functools import partial
@@ -31,6 +32,7 @@ log = logging.getLogger(__name__)
 HAND_OVER: Final = 0.1  # s between two hand-overs to the web server
 EXPIRE: Final = 0.5  # s between two looks for what does not renew itself
 TELL: Final = 60.0  # s between two lines about events that did not come
+SILENCE: Final = 5.0  # s without a word from any robot until the log says so
 
 
 class FleetBoard:
@@ -49,6 +51,8 @@ class FleetBoard:
         self._stop = False
         self._told_at, self._told = -TELL, 0
         self._subscribed = False
+        self._silent_at = math.inf
+        """When it is to be told that nothing came yet; never once something came."""
 
     def stop_on_signals(self) -> None:
         """SIGINT and SIGTERM end it. Only in the main thread."""
@@ -100,10 +104,13 @@ class FleetBoard:
             self._connection.drop(f"it does not let us read {self._prefix}/+/...: {refused}")
         else:
             self._subscribed = True
+            if self._silent_at == math.inf:
+                self._silent_at = present().mono + SILENCE
             log.info("reading %s/+", self._prefix)
 
     def received(self, message: MQTTMessage) -> None:
         """A publication of a gateway, or of anybody."""
+        self._silent_at = -math.inf
         self._fleet.take(message.topic, bytes(message.payload), message.retain, present())
 
     def _hand_over(self) -> None:
@@ -112,6 +119,9 @@ class FleetBoard:
             self._waiting = {}
 
     def _tell(self, now: float) -> None:
+        if self._subscribed and -math.inf < self._silent_at <= now:
+            self._silent_at = -math.inf
+            log.warning("nothing below %s/ so far: is no gateway there, or may we not read it?", self._prefix)
         if self._fleet.missing > self._told and now - self._told_at >= TELL:
             self._told, self._told_at = self._fleet.missing, now
             log.warning("%d events of %d did not come", self._told, self._fleet.events + self._told)

@@ -33,6 +33,9 @@ NEVER: Final = Instant(0.0, 0)
 DEFAULT_PUBLISHERS: Final = (PublisherConfig("json"), PublisherConfig("mavlink"), PublisherConfig("mirror"))
 LIVE_PUBLISHERS: Final = frozenset({"mavlink", "mirror", "http", "mqtt"})
 """Those that a replay does without: there is nobody to hear MAVLink, and a page would show the end of the log."""
+KEEPERS: Final = frozenset({"mqtt"})
+"""They, and the controllers that have them, have their turn first wherever they are written: they keep on the disk what
+others show, so that nothing was shown which is lost when we are killed."""
 DEFAULT_CONTROLLER: Final = ControllerConfig(
     "robot_status_controller", "mav_robot_status/IndustrialRobotStatusController", {}, "default"
 )
@@ -65,6 +68,10 @@ def _is_default(controller: ControllerConfig) -> bool:
 
 def _publishers(controller: ControllerConfig) -> tuple[PublisherConfig, ...]:
     return DEFAULT_PUBLISHERS if controller.publishers is None else controller.publishers
+
+
+def _keeps_nothing(controller: ControllerConfig) -> bool:
+    return KEEPERS.isdisjoint(publisher.type for publisher in _publishers(controller))
 
 
 def _key(config: PublisherConfig) -> tuple[str, str]:
@@ -143,7 +150,7 @@ class Plant:
         slots = [Slot(v.system, v.component, v.handle) for v in config.vehicles]
         self.hw = MavlinkRobotHW(config.hardware, slots, config.identity.component)
         self.hw.speak_as(config.identity.system, config.identity.component)
-        self._controllers = config.controllers or (DEFAULT_CONTROLLER,)
+        self._controllers = sorted(config.controllers or (DEFAULT_CONTROLLER,), key=_keeps_nothing)
         self._posts: list[_Post] = []
         self._idle: list[_Post] = []
         """Those of them that do not run."""
@@ -282,7 +289,7 @@ class Plant:
     def _publishers(self, config: ControllerConfig) -> list[Publisher]:
         """The publishers of a controller; on replay without those for the living."""
         heard = [p for p in _publishers(config) if p.type not in LIVE_PUBLISHERS or not self._context.patient]
-        return [self._publisher(p, config.where) for p in heard]
+        return [self._publisher(p, config.where) for p in sorted(heard, key=lambda p: p.type not in KEEPERS)]
 
     def _publisher(self, config: PublisherConfig, where: str) -> Publisher:
         """The publisher that there is, or a new one."""

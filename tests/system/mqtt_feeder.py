@@ -3,7 +3,7 @@
     python -m tests.system.mqtt_feeder --robots 500 --rate 1 --events 0.1 --seconds 60 mqtt://127.0.0.1:1883/robots
 
 Each robot has a status `rate` times a second, of which the share `events` differs from the one before. A line of
-JSON on standard output tells each change as soon as the publisher has it, the last one what it cost.
+JSON on standard output tells each change as soon as the publisher has taken it, the last one what it cost.
 """
 
 from __future__ import annotations
@@ -78,12 +78,12 @@ def main() -> None:
             for number in range(turn, upto):
                 robot, round_ = number % asked.robots, number // asked.robots
                 done = asked.changes and told >= asked.changes
-                if round_ == 0 or (not done and int(round_ * asked.events) != int((round_ - 1) * asked.events)):
-                    changes[robot] += 1
-                    told += 1
-                    if not asked.quiet:
-                        print(json.dumps({"robot": robot, "change": changes[robot]}), flush=True)
+                new = round_ == 0 or (not done and int(round_ * asked.events) != int((round_ - 1) * asked.events))
+                changes[robot] += new
                 publisher.publish(message(asked.first + robot, changes[robot], now.unix_us))
+                told += new
+                if new and not asked.quiet:
+                    print(json.dumps({"robot": robot, "change": changes[robot]}), flush=True)
             publisher.service(now)
             spent += time.thread_time() - before
             turn = upto

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
+import os
 import re
 import select
+import shutil
 import signal
 import socket
 import subprocess
@@ -26,8 +29,12 @@ from .mqtt_fleet import measure, vehicles
 
 pytestmark = pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
 
+DOCUMENT = Path(__file__).parents[2] / "docs" / "mqtt.md"
 ROBOT = "rover-1"
 KEEPALIVE = 2
+WILL = 1.5 * KEEPALIVE + 7
+"""Seconds within which mosquitto (2.0.11) says the will of a connection that has fallen silent: it looks for such every
+6 s, and counts in whole seconds. So it does with a client that holds nothing of ours."""
 Start = Callable[..., Any]
 
 
@@ -75,9 +82,9 @@ def board(gateway: Callable[..., Gateway]) -> Callable[..., int]:
 class Feeder:
     """A gateway that needs no vehicle."""
 
-    def __init__(self, url: str, spool: Path, *arguments: str) -> None:
+    def __init__(self, url: str, spool: Path, *arguments: str, before: tuple[str, ...] = ()) -> None:
         options = (f"spool={spool}", f"keepalive={KEEPALIVE}")
-        command = [sys.executable, "-m", "tests.system.mqtt_feeder", url]
+        command = [*before, sys.executable, "-m", "tests.system.mqtt_feeder", url]
         for option in options:
             command += ["--option", option]
         self.process = subprocess.Popen(
@@ -126,18 +133,21 @@ class Feeder:
 
 @pytest.fixture
 def feeder(ended: contextlib.ExitStack, tmp_path: Path) -> Callable[..., Feeder]:
-    return lambda url, *arguments, spool=tmp_path / "spool.sqlite": ended.enter_context(
-        contextlib.closing(Feeder(url, spool, *arguments))
+    return lambda url, *arguments, spool=tmp_path / "spool.sqlite", before=(): ended.enter_context(
+        contextlib.closing(Feeder(url, spool, *arguments, before=before))
     )
 
 
 class Wall:
     """A TCP relay that may be cut: nothing passes any more, and nobody is told."""
 
+    before: tuple[str, ...] = ()
+    listener: tuple[str, ...] = ()
+
     def __init__(self, port: int) -> None:
-        self._to = port
+        self.to = port
         self._listening = socket.create_server(("127.0.0.1", 0))
-        self.port = self._listening.getsockname()[1]
+        self.url = f"mqtt://127.0.0.1:{self._listening.getsockname()[1]}/{PREFIX}"
         self.cut = False
         self._stop = False
         self._pairs: list[tuple[socket.socket, socket.socket]] = []
@@ -159,7 +169,7 @@ class Wall:
             readable, _, _ = select.select([self._listening, *ways], [], [], 0.05)
             for end in readable:
                 if end is self._listening:
-                    self._pairs.append((end.accept()[0], socket.create_connection(("127.0.0.1", self._to))))
+                    self._pairs.append((end.accept()[0], socket.create_connection(("127.0.0.1", self.to))))
                 elif end.fileno() >= 0:
                     self._pass(end, ways[end])
 
@@ -177,6 +187,51 @@ class Wall:
 @pytest.fixture
 def wall(ended: contextlib.ExitStack) -> Callable[[int], Wall]:
     return lambda port: ended.enter_context(contextlib.closing(Wall(port)))
+
+
+class Line:
+    """A network namespace whose only line to here may be pulled: what runs behind `before` has no other."""
+
+    def __init__(self, port: int) -> None:
+        self.to, self._cut = port, False
+        self._name = f"mrs{os.getpid()}"
+        net = f"10.213.{os.getpid() % 256}"
+        self.url = f"mqtt://{net}.1:{port}/{PREFIX}"
+        self.listener = (f"listener {port} {net}.1",)
+        self.before = ("ip", "netns", "exec", self._name)
+        for command in (
+            f"netns add {self._name}",
+            f"link add {self._name}a type veth peer name {self._name}b netns {self._name}",
+            f"addr add {net}.1/24 dev {self._name}a",
+            f"link set {self._name}a up",
+            f"-n {self._name} addr add {net}.2/24 dev {self._name}b",
+            f"-n {self._name} link set {self._name}b up",
+        ):
+            if shutil.which("ip") is None or self._ip(command):
+                self.close()
+                pytest.skip("network namespaces are not permitted here")
+
+    @property
+    def cut(self) -> bool:
+        return self._cut
+
+    @cut.setter
+    def cut(self, cut: bool) -> None:
+        self._cut = cut
+        assert self._ip(f"-n {self._name} link set {self._name}b {'down' if cut else 'up'}") == 0
+
+    def close(self) -> None:
+        if shutil.which("ip") is not None:
+            self._ip(f"link del {self._name}a")
+            self._ip(f"netns del {self._name}")
+
+    def _ip(self, command: str) -> int:
+        return subprocess.run(["ip", *command.split()], capture_output=True, check=False, timeout=30).returncode
+
+
+@pytest.fixture
+def line(ended: contextlib.ExitStack) -> Callable[[int], Line]:
+    return lambda port: ended.enter_context(contextlib.closing(Line(port)))
 
 
 def online(heard: Heard) -> bool:
@@ -285,9 +340,46 @@ def test_tls_with_a_client_certificate_and_a_password_from_the_environment(
     assert "horse" not in Path(f"/proc/{gateway.process.pid}/cmdline").read_text()
 
 
-def _passwords(folder: Path) -> str:
+def test_the_commands_of_the_document_bring_a_robot_over_tls_to_the_board(
+    broker: Start,
+    gateway: Start,
+    autopilot: Start,
+    certificates: Certificates,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    block = re.search(r"```text\n(mav-robot-status .*?)```", DOCUMENT.read_text(), re.DOTALL)
+    assert block is not None
+    at = broker("allow_anonymous false", _passwords(tmp_path, "rover", "board"), *certificates.lines())
+    (tmp_path / "password").write_text("correct horse")
+    (tmp_path / "password").chmod(0o600)
+    for there, here in (("ca.pem", "ca.pem"), ("rover.pem", "client.pem"), ("rover.key", "client.key")):
+        shutil.copy(certificates[here], tmp_path / there)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    http = free_port()
+    text = block[1].replace("broker.example", f"localhost:{at.port}").replace("8765", str(http)).replace(":14550", ":0")
+    publishing, showing = (line.split()[1:] for line in text.replace("\\\n", "").splitlines())
+    first = gateway(*publishing)
+    autopilot(ardurover.READY, first.address)
+    monkeypatch.setenv("MAV_ROBOT_STATUS_MQTT_PASSWORD", "correct horse")
+    monkeypatch.setenv("SSL_CERT_FILE", certificates["ca.pem"])  # one of the system's authorities
+    gateway(*showing)
+    eventually(lambda: [line["mode"] for line in served(http)] == ["MANUAL"])
+
+
+def served(http: int) -> list[dict[str, Any]]:
+    """What a board shows; nothing while it starts."""
+    with contextlib.suppress(OSError):
+        return vehicles(http)
+    return []
+
+
+def _passwords(folder: Path, *users: str) -> str:
     path = folder / "passwords"
-    subprocess.run(["mosquitto_passwd", "-b", "-c", str(path), "rover", "correct horse"], check=True, timeout=30)
+    path.touch()
+    for user in users or ("rover",):
+        subprocess.run(["mosquitto_passwd", "-b", str(path), user, "correct horse"], check=True, timeout=30)
     return f"password_file {path}"
 
 
@@ -311,33 +403,78 @@ def test_a_broker_that_is_away_for_a_while_gets_every_event_in_order(
     assert len([line for line in gateway.log if "trying again" in line]) <= 2, gateway.log
 
 
-def test_a_gateway_that_is_killed_leaves_its_events_to_the_next(broker: Start, listener: Start, feeder: Start) -> None:
-    at = broker()
-    at.stop()
-    killed = feeder(at.url, "--rate", "100", "--seconds", "60")
-    killed.wait_for(300)
-    killed.process.send_signal(signal.SIGKILL)
-    killed.end()
-    at.start()
-    heard = listener(at.port)
-    feeder(at.url, "--rate", "1", "--robots", "1")
-    told = heard.wait(lambda: len(found := changes(heard.of("events"))) > 298 and found, 20)
-    beginning = told.index(1, 1) if 1 in told[1:] else len(told)
-    of_killed = told[:beginning]
-    assert of_killed == list(range(1, len(of_killed) + 1))
-    assert len(killed.told) - len(of_killed) <= 3  # the last hundredths of a second before the kill
-
-
-def test_a_network_that_is_cut_costs_no_event_and_is_noticed_on_both_sides(
-    broker: Start, listener: Start, feeder: Start, wall: Start
+def test_of_a_thousand_changes_none_is_lost_though_gateways_are_killed_and_the_broker_is_stopped(
+    broker: Start, listener: Start, feeder: Start
 ) -> None:
-    at = broker()
+    at = broker(memory=True)
     heard = listener(at.port)
-    between = wall(at.port)
-    gateway = feeder(f"mqtt://127.0.0.1:{between.port}/{PREFIX}", "--rate", "20", "--seconds", "60")
+    told: list[list[int]] = []
+    for number in range(5):
+        if number == 1:
+            at.stop()
+        killed = feeder(at.url, "--rate", "100", "--seconds", "60")
+        killed.wait_for(200)
+        killed.process.send_signal(signal.SIGKILL)
+        killed.end()
+        told.append(killed.told)
+        if number == 3:
+            at.start()
+    last = feeder(at.url, "--rate", "1", "--changes", "1", "--seconds", "60")
+    last.wait_for(1)
+    assert sum(map(len, told)) >= 1000
+    assert last.end()["waiting"] == 0
+    heard.wait(lambda: len(sessions(heard)) == 6)
+    for session, changes_told in zip(sessions(heard), told, strict=False):
+        assert session[: len(changes_told)] == changes_told  # the last of all may be one that was not told any more
+        assert len(session) <= len(changes_told) + 1
+
+
+def sessions(heard: Listener) -> list[list[int]]:
+    """The changes of each start of a gateway, in the order of the starts."""
+    events = heard.of("events")
+    begun = dict.fromkeys(json.loads(h.text)["session"] for h in events)
+    return [changes([h for h in events if json.loads(h.text)["session"] == session]) for session in begun]
+
+
+def test_every_line_that_a_gateway_wrote_before_it_was_killed_has_its_event(
+    broker: Start, listener: Start, gateway: Start, started: Start, wire: Start, tmp_path: Path
+) -> None:
+    at = broker(memory=True)
+    heard = listener(at.port)
+    told = set[str]()
+    for number in range(6):
+        killed = gateway(
+            *("udp:127.0.0.1:0", "--changes-only", "--mqtt", at.url, "--mqtt-robot", "rover-{system}"),
+            *("--mqtt-spool", str(tmp_path / "spool.sqlite"), "--mqtt-keepalive", str(KEEPALIVE)),
+        )
+        rover = wire(killed.address)
+        for count in range(3 + number):
+            rover.beat(custom_mode=10 * (count % 2))
+            killed.wait_for(lambda line, seq=count: line["seq"] == seq)
+        killed.process.kill()  # a fraction of a millisecond after the last line
+        killed.wait_for_end()
+        told |= {line.status["stamp"] for line in killed.lines}
+    started(at.url)
+    assert len(told) >= 33
+    heard.wait(lambda: not told - {json.loads(h.text)["stamp"] for h in heard.of("events")})
+
+
+@pytest.mark.parametrize("way", ["wall", "line"])
+def test_a_network_that_is_cut_costs_no_event_and_is_noticed_on_both_sides(
+    broker: Start, listener: Start, feeder: Start, board: Start, wall: Start, line: Start, way: str
+) -> None:
+    between = {"wall": wall, "line": line}[way](free_port())
+    at = broker(*between.listener, port=between.to)
+    boards = [board(at.url), board(at.url)]
+    heard = listener(at.port)
+    gateway = feeder(between.url, "--rate", "20", "--seconds", "60", before=between.before)
     gateway.wait_for(40)
+    eventually(lambda: all(shown(http, "robot0")["mode"] == "AUTO" for http in boards))
+    cut = time.monotonic()
     between.cut = True
-    broken = heard.wait_for(lambda h: h.text == "CONNECTIONBROKEN", KEEPALIVE * 1.5 + 15)
+    eventually(lambda: all(shown(http, "robot0")["mode"] == "UNKNOWN" for http in boards), KEEPALIVE + 0.5)
+    broken = heard.wait_for(lambda h: h.text == "CONNECTIONBROKEN", WILL + SOON)
+    assert KEEPALIVE < broken.at - cut < WILL + 1  # for a busy machine
     gateway.wait_for(len(gateway.told) + 100)
     between.cut = False
     heard.wait_for(online, 20, after=broken.at)
@@ -345,6 +482,7 @@ def test_a_network_that_is_cut_costs_no_event_and_is_noticed_on_both_sides(
     heard.wait(lambda: len(changes(heard.of("events"))) >= count, 20)
     told = changes(heard.of("events"))
     assert told == list(range(1, len(told) + 1))
+    eventually(lambda: all(shown(http, "robot0")["mode"] == "AUTO" for http in boards))
     time.sleep(KEEPALIVE * 2)
     assert heard.of("connection")[-1].text == "ONLINE"  # the will of the old connection does not come after it
 
@@ -369,10 +507,68 @@ def test_a_full_disk_loses_nothing_while_memory_holds(
         assert len([line for line in gateway.log if "takes no events" in line]) == 1, gateway.log
 
 
+def test_a_gateway_that_is_killed_while_the_disk_is_full_leaves_its_events_all_the_same(
+    broker: Start, listener: Start, feeder: Start, tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    with _small(disk, "2m") as full:
+        at = broker()
+        at.stop()
+        killed = feeder(at.url, "--rate", "100", "--seconds", "60", spool=disk / "s.sqlite")
+        killed.wait_for(100)
+        full()
+        killed.wait_for(500)
+        killed.process.kill()
+        killed.end()
+        at.start()
+        heard = listener(at.port)
+        feeder(at.url, "--rate", "1", "--events", "0", "--seconds", "60", spool=disk / "s.sqlite")
+        heard.wait(lambda: sessions(heard) and len(sessions(heard)[0]) >= len(killed.told), 20)
+        assert sessions(heard)[0][: len(killed.told)] == killed.told
+        assert any("takes no events" in line for line in killed.log), killed.log
+
+
+def test_a_disk_that_hangs_does_not_hold_up_the_gateway(
+    broker: Start, listener: Start, feeder: Start, tmp_path: Path
+) -> None:
+    with _freezable(tmp_path) as (disk, freeze):
+        at = broker()
+        heard = listener(at.port)
+        gateway = feeder(at.url, "--rate", "100", "--changes", "400", "--seconds", "60", spool=disk / "s.sqlite")
+        gateway.wait_for(100)
+        freeze("-f")
+        before = time.monotonic()
+        gateway.wait_for(len(gateway.told) + 100)
+        assert time.monotonic() - before < 2.0  # it goes on at its own rate
+        freeze("-u")
+        assert gateway.end()["dropped"] == 0
+        heard.wait(lambda: changes(heard.of("events")) == gateway.told)
+        assert len([line for line in gateway.log if "the disk took no event within" in line]) == 1, gateway.log
+
+
 @contextlib.contextmanager
-def _small(folder: Path) -> Iterator[Callable[[], None]]:
-    """A disk of 300 kB; what is given fills it."""
-    mount = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(folder)], capture_output=True)
+def _freezable(folder: Path) -> Iterator[tuple[Path, Callable[[str], object]]]:
+    """A disk on which every write waits from `-f` to `-u`."""
+    image, disk = folder / "image", folder / "disk"
+    disk.mkdir()
+    with image.open("wb") as file:
+        file.truncate(20_000_000)
+    for command in (["mkfs.ext4", "-q", str(image)], ["mount", "-o", "loop", str(image), str(disk)]):
+        if shutil.which(command[0]) is None or subprocess.run(command, capture_output=True, check=False).returncode:
+            pytest.skip("mounting is not permitted here")
+    freeze = functools.partial(subprocess.run, check=False, timeout=30)
+    try:
+        yield disk, lambda what: freeze(["fsfreeze", what, str(disk)])
+    finally:
+        freeze(["fsfreeze", "-u", str(disk)], capture_output=True)
+        freeze(["umount", "-l", str(disk)])
+
+
+@contextlib.contextmanager
+def _small(folder: Path, size: str = "300k") -> Iterator[Callable[[], None]]:
+    """A small disk; what is given fills it."""
+    mount = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)], capture_output=True)
     if mount.returncode:
         pytest.skip("mounting is not permitted here")
 
@@ -467,6 +663,16 @@ def test_a_board_without_its_broker_says_so(broker: Start, board: Start, feeder:
     eventually(lambda: shown(http, "robot0")["mode"] == "UNKNOWN", KEEPALIVE + 2)
 
 
+def test_a_board_that_hears_nobody_says_once_why_that_may_be(broker: Start, gateway: Start, tmp_path: Path) -> None:
+    rights = tmp_path / "rights"
+    rights.write_text("topic read elsewhere\n")
+    at = broker(f"acl_file {rights}")  # mosquitto lets us subscribe all the same, and passes on nothing
+    shown = gateway("board", at.url, "--http", f"127.0.0.1:{free_port()}")
+    shown.wait_for_log(f"nothing below {PREFIX}/ so far: is no gateway there, or may we not read it")
+    time.sleep(1)
+    assert len([line for line in shown.log if "so far" in line]) == 1
+
+
 def test_two_hundred_robots_on_one_board(tmp_path: Path) -> None:
     found = measure(200, 2, 4.0, tmp_path)
     assert (found["live_on_the_board"], found["events_missing"]) == (200, 0)
@@ -486,6 +692,7 @@ def test_two_hundred_robots_on_one_board(tmp_path: Path) -> None:
         pytest.param(["mutual"], ["--mqtt-ca", "ca.pem"], "client certificate", id="no client certificate"),
         pytest.param(["forbidden"], [], "may not do what is asked", id="forbidden will"),
         pytest.param(["no events"], [], "does not let us publish", id="forbidden events"),
+        pytest.param(["plain"], ["--mqtt-ca", "ca.pem"], "does it speak TLS on this port", id="no TLS"),
         pytest.param(["nobody"], [], "Connection refused", id="no broker"),
     ],
 )
@@ -514,18 +721,21 @@ def test_what_is_wrong_is_one_line_and_tried_again_without_hurry(
         "mutual": (*certificates.lines(), f"cafile {certificates['ca.pem']}", "require_certificate true"),
         "forbidden": (f"acl_file {rights}",),
         "no events": (f"acl_file {rights}",),
+        "plain": (),
         "nobody": (),
     }
-    at = broker(*kinds[lines[0]])
+    log = tmp_path / "broker.log"
+    at = broker(*kinds[lines[0]], f"log_dest file {log}")
     if lines == ["nobody"]:
         at.stop()
     files = {name: certificates[name] for name in ("ca.pem", "other.pem")} | {"WRONG": str(wrong)}
-    secure = lines[0] in ("tls", "expired", "mutual")
+    secure = lines[0] in ("tls", "expired", "mutual", "plain")
     gateway = started(at.tls_url if secure else at.url, "--system", "1", *(files.get(word, word) for word in more))
     gateway.wait_for_log(says)
-    used = gateway.cpu()
+    used, tried = gateway.cpu(), log.read_text().count(" connection from ")
     time.sleep(4)
     assert gateway.cpu() - used < 0.5
+    assert lines == ["nobody"] or 1 <= log.read_text().count(" connection from ") - tried <= 3  # after 1 s, 2 s, ...
     complaints = [line for line in gateway.log if "trying again" in line]
     assert len(complaints) == 1, gateway.log
     assert "swordfish" not in "".join(gateway.log)

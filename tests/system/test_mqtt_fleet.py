@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -15,7 +16,14 @@ from .mqtt_fleet import bridge, feeder, measure
 
 pytestmark = pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "fleet.md"
+ROOT = Path(__file__).parents[2]
+DOCUMENT = ROOT / "docs" / "fleet.md"
+MEASURES = [
+    line.split()[1:]
+    for name in ("mqtt.md", "fleet.md")
+    for line in (ROOT / "docs" / name).read_text().splitlines()
+    if line.startswith(".venv/bin/python -m tests.system.mqtt_fleet")
+]
 
 
 def test_every_event_of_two_bridged_sites_is_got_by_exactly_one_of_three_consumers(tmp_path: Path) -> None:
@@ -27,6 +35,19 @@ def test_every_event_of_two_bridged_sites_is_got_by_exactly_one_of_three_consume
     shared = found["consumers"]
     assert (sum(shared["events"]), shared["again"], shared["missing"]) == (found["events_told"], 0, 0)
     assert min(shared["events"]) > 0
+
+
+@pytest.mark.parametrize("command", MEASURES, ids=" ".join)
+def test_the_commands_that_measure_do(command: list[str]) -> None:
+    small = ("-r", "8", "-g", "2", "-s", "1")  # the last of an option counts
+    done = subprocess.run([sys.executable, *command, *small], cwd=ROOT, capture_output=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["robots"], found["live_on_the_board"], found["events_missing"]) == (8, 8, 0)
+
+
+def test_the_measures_were_found() -> None:
+    assert len(MEASURES) == 3
 
 
 def test_the_bridge_that_is_documented_is_the_one_that_runs_here() -> None:

@@ -85,6 +85,8 @@ def unreachable(error: Exception) -> str:
         return "the name is not known"
     if isinstance(error, TimeoutError):
         return "no answer"
+    if isinstance(error, ConnectionResetError):  # so early only in the handshake of TLS
+        return "the broker hangs up; does it speak TLS on this port?"
     if isinstance(error, OSError):
         return error.strerror or str(error)
     return f"{type(error).__name__}: {error}"

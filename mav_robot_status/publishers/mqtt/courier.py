@@ -1,25 +1,26 @@
-"""The thread that brings statuses and events to the broker. The gateway hands over, and never waits for it."""
+"""The thread that brings statuses and events to the broker. The gateway hands over, and waits for the journal only."""
 
 from __future__ import annotations
 
 import contextlib
-import json
 import logging
 import threading
 from collections import Counter, deque
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
+from ...errors import LinkError
 from .complaints import Complaints
-from .lines import event_of, line_of
+from .journal import Journal
+from .lines import line_of
 from .loop import Loop
 from .robot import Robot
-from .spool import Spool
+from .spool import Event, Spool
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ...clock import Instant
-    from ...interface import Detail, RobotStatus, RobotStatusMsg
+    from ...interface import RobotStatusMsg
     from .options import MqttOptions
 
 log = logging.getLogger(__name__)
@@ -31,30 +32,29 @@ PARTING: Final = 1.0
 CLOSING: Final = 5.0  # s to wait for the thread
 
 
-class Change(NamedTuple):
-    """One change of one robot's status, not yet an event."""
-
-    robot: str
-    seq: int
-    msg: RobotStatusMsg
-    before: tuple[RobotStatus, Detail] | None
-
-
 class Courier:
-    """`tell` and `change` are for the gateway's thread, and take microseconds."""
+    """`keep` and `hand_over` are for the gateway's thread."""
 
-    def __init__(self, options: MqttOptions, session: str, clock: Callable[[], Instant]) -> None:
+    def __init__(self, options: MqttOptions, clock: Callable[[], Instant]) -> None:
         """Open the spool. Raises LinkError if that cannot be."""
-        self._options, self._session, self._clock = options, session, clock
+        self._options, self._clock = options, clock
         self._spool = Spool(options.spool, options.spool_size, options.spool_age)
+        try:
+            self._journal = Journal(f"{options.spool}-new", self._spool.last)
+        except LinkError:
+            self._spool.close(0.0, 0.0)
+            raise
+        for event in self._journal.left:
+            self._spool.add(event)
+        self._place = self._journal.place
         self._loop = Loop(clock)
         self._complaints = Complaints(options.broker)
         self._robots: dict[str, Robot] = {}
         self._lock = threading.Lock()
         self._latest: dict[str, RobotStatusMsg] = {}
-        self._changes: deque[Change] = deque()
+        self._events: deque[Event] = deque()
         self._lost: Counter[str] = Counter()
-        """Changes for which the thread had no time, by robot."""
+        """Events for which the thread had no time, by robot."""
         self._lines: Counter[str] = Counter()
         self.waiting = self.dropped = 0
         """Events of now, and ever since the spool was made. Read from other threads."""
@@ -65,13 +65,20 @@ class Courier:
         """Begin."""
         self._thread.start()
 
-    def hand_over(self, statuses: dict[str, RobotStatusMsg], changes: list[Change]) -> None:
-        """The newest status of each robot, and what has changed since the last call."""
+    def keep(self, robot: str, text: str, at: float) -> None:
+        """An event, at a unix time (s). It is on the disk when this returns, unless the journal's LONGEST was over."""
+        self._place += 1
+        event = Event(self._place, robot, at, text)
+        self._journal.keep(event)
+        with self._lock:
+            self._events.append(event)
+            if len(self._events) > MOST_HANDED:
+                self._lost[self._events.popleft().robot] += 1
+
+    def hand_over(self, statuses: dict[str, RobotStatusMsg]) -> None:
+        """The newest status of each robot; events that were kept are taken too."""
         with self._lock:
             self._latest.update(statuses)
-            self._changes.extend(changes)
-            while len(self._changes) > MOST_HANDED:
-                self._lost[self._changes.popleft().robot] += 1
         self._loop.wake()
 
     def close(self) -> None:
@@ -96,26 +103,25 @@ class Courier:
                 robot.connection.close()
             with contextlib.suppress(Exception):
                 self._spool.close(now.mono, now.unix_us / 1e6)
+            self._journal.close()
             self._loop.close()
 
     def _take(self) -> None:
         """To disk first, then to the broker."""
         with self._lock:
             latest, self._latest = self._latest, {}
-            changes, self._changes = self._changes, deque()
+            events, self._events = self._events, deque()
             lost, self._lost = self._lost, Counter()
         for name, count in lost.items():
             self._spool.count_dropped(name, count)
-        for change in changes:
-            event = event_of(change.msg, change.before, change.robot, self._session, change.seq)
-            self._spool.add(change.robot, json.dumps(event), change.msg.unix_us / 1e6)
-        now = self._clock()
-        self._spool.flush(now.mono, now.unix_us / 1e6)
+        for event in events:
+            self._spool.add(event)
+        self._flush()
         self.waiting, self.dropped = self._spool.waiting, sum(self._spool.dropped.values())
         for name, msg in latest.items():
             self._robot(name).tell(line_of(msg, self._lines[name]))
             self._lines[name] += 1
-        fresh = {change.robot for change in changes}
+        fresh = {event.robot for event in events}
         for name in fresh:
             self._robot(name).pump(news=True)
         for name in fresh | latest.keys():
@@ -143,5 +149,9 @@ class Courier:
     def _until_settled(self, deadline: float) -> None:
         while (left := deadline - self._clock().mono) > 0 and not all(r.settled for r in self._robots.values()):
             self._loop.turn(min(left, 0.1))
+        self._flush()
+
+    def _flush(self) -> None:
         now = self._clock()
         self._spool.flush(now.mono, now.unix_us / 1e6)
+        self._journal.forget(self._spool.settled)

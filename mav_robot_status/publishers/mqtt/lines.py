@@ -11,7 +11,7 @@ from ..json_lines import native, native_body
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ...interface import Detail, RobotStatus, RobotStatusMsg
+    from ...interface import RobotStatusMsg
 
 UNKNOWN: Final[dict[str, Any]] = {
     "mode": "UNKNOWN",
@@ -52,11 +52,10 @@ def unknown(line: Mapping[str, Any], stamp: str, why: str | None) -> dict[str, A
 
 
 def event_of(
-    msg: RobotStatusMsg, before: tuple[RobotStatus, Detail] | None, robot: str, session: str, seq: int
+    msg: RobotStatusMsg, old: Mapping[str, Any], new: Mapping[str, Any], robot: str, session: str, seq: int
 ) -> dict[str, Any]:
-    """What one change was: every member that is another now, with what it was; null for all before the first."""
-    new = _members(msg.handle, msg.status, msg.detail)
-    old = {} if before is None else _members(msg.handle, *before)
+    """What one change was: every member that is another now, with what it was; null for all before the first, which
+    has no `old`."""
     return {
         "id": f"{session}-{seq}",
         "session": session,
@@ -69,14 +68,14 @@ def event_of(
         "changed": {
             name: {"old": old.get(name), "new": value}
             for name, value in new.items()
-            if before is None or old.get(name) != value
+            if not old or old.get(name) != value
         },
     }
 
 
-def _members(handle: str, status: RobotStatus, detail: Detail) -> dict[str, Any]:
+def members_of(msg: RobotStatusMsg) -> dict[str, Any]:
     """A line's members that can change, those of `vehicle` and `link` as `vehicle.flight_mode`, `link.state`."""
-    line = json.loads("{" + native_body(handle, status, detail) + "}}")
+    line = json.loads("{" + native_body(msg.handle, msg.status, msg.detail) + "}}")
     groups = {name: line.pop(name) for name in ("vehicle", "link")}
     for name in ("handle", "system", "component"):
         del line[name]

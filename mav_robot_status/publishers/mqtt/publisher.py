@@ -1,13 +1,15 @@
-"""The `mqtt` publisher: hands statuses and changes to a thread of its own."""
+"""The `mqtt` publisher: puts each change on the disk at once, and hands statuses to a thread of its own."""
 
 from __future__ import annotations
 
+import json
 import logging
 import secrets
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ...clock import now as present
 from ...errors import UsageError
+from .lines import event_of, members_of
 from .naming import Naming
 from .options import read
 
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
     from ...clock import Instant
     from ...interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg
-    from .courier import Change, Courier
+    from .courier import Courier
 
 log = logging.getLogger(__name__)
 
@@ -27,11 +29,13 @@ SLACK: Final = 0.02  # s: what comes this much early is still periodic
 class _Known:
     """What is known of one handle."""
 
-    __slots__ = ("content", "robot", "seq", "told_at")
+    __slots__ = ("content", "members", "robot", "seq", "told_at")
 
     def __init__(self, robot: str) -> None:
         self.robot = robot
         self.content: tuple[RobotStatus, Detail] | None = None
+        self.members: dict[str, Any] = {}
+        """The same, as its last event told it."""
         self.seq = 0
         """Of its last event."""
         self.told_at = float("-inf")
@@ -56,16 +60,15 @@ class MqttPublisher:
             if (error.name or "").startswith("mav_robot_status"):
                 raise
             raise UsageError("mqtt: this output needs an extra: pip install 'mav-robot-status[mqtt]'") from None
-        self._change = courier.Change
+        self._session = secrets.token_hex(4)
         self._known: dict[str, _Known | None] = {}
         self._names: dict[str, str] = {}
         """Handles by the name of their robot."""
         self._statuses: dict[str, RobotStatusMsg] = {}
-        self._changes: list[Change] = []
-        self._waiting: list[RobotStatusMsg] = []
+        self._waiting: list[tuple[_Known, RobotStatusMsg]] = []
         self._courier: Courier | None = None
         if not context.patient:
-            self._courier = courier.Courier(options, secrets.token_hex(4), clock)
+            self._courier = courier.Courier(options, clock)
             self._courier.start()
 
     def busy(self) -> bool:
@@ -83,38 +86,38 @@ class MqttPublisher:
         return self._courier.dropped if self._courier else 0
 
     def publish(self, msg: RobotStatusMsg) -> None:
-        """Hold it until `service`, which is called after every round of updates."""
-        if self._courier:
-            self._waiting.append(msg)
+        """Keep what has changed: from here on it is delivered, or counted as dropped, even if we are killed.
+
+        The rest waits until `service`, which is called after every round of updates.
+        """
+        known = self._of(msg) if self._courier else None
+        if known is None or self._courier is None:
+            return
+        content = (msg.status, msg.detail)
+        if content != known.content:
+            before, known.content, known.members = known.members, content, members_of(msg)
+            known.seq += 1
+            known.told_at = float("-inf")
+            event = event_of(msg, before, known.members, known.robot, self._session, known.seq)
+            self._courier.keep(known.robot, json.dumps(event), msg.unix_us / 1e6)
+        self._waiting.append((known, msg))
 
     def service(self, now: Instant) -> float | None:
-        """Hand over changes, and the status of each robot once in a PERIOD."""
-        for msg in self._waiting:
-            self._sort(msg, now.mono)
+        """Hand over the status of each robot once in a PERIOD, and after a change."""
+        for known, msg in self._waiting:
+            if known.robot in self._statuses or now.mono - known.told_at >= PERIOD - SLACK:
+                known.told_at = now.mono
+                self._statuses[known.robot] = msg
         self._waiting.clear()
-        if self._courier and (self._statuses or self._changes):
-            self._courier.hand_over(self._statuses, self._changes)
-            self._statuses, self._changes = {}, []
+        if self._courier and self._statuses:
+            self._courier.hand_over(self._statuses)
+            self._statuses = {}
         return None
 
     def close(self) -> None:
         """End the thread; what it could not deliver waits on the disk."""
         if self._courier:
             self._courier.close()
-
-    def _sort(self, msg: RobotStatusMsg, now: float) -> None:
-        known = self._of(msg)
-        if known is None:
-            return
-        content = (msg.status, msg.detail)
-        if content != known.content:
-            known.seq += 1
-            self._changes.append(self._change(known.robot, known.seq, msg, known.content))
-            known.content = content
-        elif now - known.told_at < PERIOD - SLACK:
-            return
-        known.told_at = now
-        self._statuses[known.robot] = msg
 
     def _of(self, msg: RobotStatusMsg) -> _Known | None:
         """What is known of a message's handle; None if its robot has no name, or one that another has."""

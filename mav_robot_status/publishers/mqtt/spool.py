@@ -1,7 +1,8 @@
 """Events that wait to be delivered, on disk: in order, bounded in size and age, what is dropped is counted.
 
-SQLite with a write-ahead log: what was committed outlives a kill of the process; a power cut may take the last moments.
-While the disk takes nothing events wait in memory instead, and are written once it does.
+SQLite with a write-ahead log: what was committed outlives a kill of the process; a power cut may take the last moments
+(synchronous=NORMAL: only that would need FULL, and a sync of the disk for each event). While the disk takes nothing
+events wait in memory instead, and are written once it does.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ CREATE TABLE IF NOT EXISTS events
     (place INTEGER PRIMARY KEY, robot TEXT NOT NULL, at REAL NOT NULL, text TEXT NOT NULL);
 CREATE INDEX IF NOT EXISTS by_robot ON events (robot, place);
 CREATE TABLE IF NOT EXISTS dropped (robot TEXT PRIMARY KEY, count INTEGER NOT NULL);
+CREATE TABLE IF NOT EXISTS last (one INTEGER PRIMARY KEY, place INTEGER NOT NULL);
 """
 
 
@@ -41,7 +43,7 @@ class Event(NamedTuple):
     """One event that waits."""
 
     place: int
-    """Rises with every event of the spool."""
+    """Rises with every event that the spool was ever given."""
     robot: str
     at: float
     """Unix seconds."""
@@ -57,7 +59,9 @@ class Spool:
         self._db = self._open()
         self._unwritten: deque[Event] = deque()
         self._finished: dict[int, Event] = {}
-        self._place = self._db.execute("SELECT coalesce(max(place), 0) FROM events").fetchone()[0]
+        query = "SELECT max(place) FROM (SELECT place FROM events UNION SELECT place FROM last UNION SELECT 0)"
+        self.last = self._place = int(self._db.execute(query).fetchone()[0])
+        """Places of the last events that were ever on the disk, and added."""
         query = f"SELECT count(*), coalesce(sum(length(text) + {OVERHEAD}), 0) FROM events"
         self._written, self._bytes = (int(number) for number in self._db.execute(query).fetchone())
         """How many events are on the disk, and their bytes."""
@@ -72,17 +76,23 @@ class Spool:
 
     def robots(self) -> list[str]:
         """Those for whom something waits."""
-        return [robot for (robot,) in self._db.execute("SELECT DISTINCT robot FROM events")]
+        written = (robot for (robot,) in self._db.execute("SELECT DISTINCT robot FROM events"))
+        return list(dict.fromkeys([*written, *(event.robot for event in self._unwritten)]))
+
+    @property
+    def settled(self) -> int:
+        """The place up to which every event is on the disk, delivered or dropped."""
+        return self._unwritten[0].place - 1 if self._unwritten else self._place
 
     @property
     def waiting(self) -> int:
         """How many events wait."""
         return max(0, self._written + len(self._unwritten) - len(self._finished))
 
-    def add(self, robot: str, text: str, at: float) -> None:
-        """Take an event; `flush` writes it."""
-        self._place += 1
-        self._unwritten.append(Event(self._place, robot, at, text))
+    def add(self, event: Event) -> None:
+        """Take an event, whose place is beyond those before; `flush` writes it."""
+        self._place = event.place
+        self._unwritten.append(event)
         if len(self._unwritten) > MOST_UNWRITTEN:
             self._drop(self._unwritten.popleft().robot)
 
@@ -118,6 +128,7 @@ class Spool:
             with self._db:
                 self._db.execute("BEGIN")
                 self._write()
+            self.last = self._place
             self._unwritten.clear()
             self._finished.clear()
             self._newly.clear()
@@ -138,6 +149,7 @@ class Spool:
             if self._db.execute("DELETE FROM events WHERE place = ?", (event.place,)).rowcount:  # else dropped before
                 count, held = count - 1, held - _cost(event)
         self._db.executemany("INSERT INTO events VALUES (?, ?, ?, ?)", self._unwritten)
+        self._db.execute("INSERT OR REPLACE INTO last VALUES (0, ?)", (self._place,))
         count, held = count + len(self._unwritten), held + sum(_cost(event) for event in self._unwritten)
         while held > self._most:
             oldest = Event(*self._db.execute("SELECT place, robot, at, text FROM events ORDER BY place").fetchone())

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import logging
@@ -18,6 +19,7 @@ from mav_robot_status.interface import Audience
 from mav_robot_status.mavlink.definitions import Heartbeat
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.framing import Frame, Parser
+from mav_robot_status.publishers.mqtt.journal import Journal
 
 from ..publishers.port import Port
 from .third_party import Collecting
@@ -117,6 +119,24 @@ def test_two_controllers_share_an_output_of_the_same_options(installed: list[Col
     assert len(installed) == 2
     plant.close(START)
     assert all(made.closed for made in installed)
+
+
+@pytest.mark.parametrize("controllers", [1, 2])
+def test_what_mqtt_keeps_is_on_the_disk_before_another_output_tells_it(
+    stdout: TextIO, tmp_path: Path, controllers: int
+) -> None:
+    fails = PublisherConfig("json", {"path": "/dev/full"})
+    keeps = PublisherConfig("mqtt", {"url": "mqtt://127.0.0.1:1/robots", "spool": str(tmp_path / "s"), "robot": "r"})
+    both = (controller("c", OURS, fails, keeps),)
+    one_each = (controller("a", OURS, fails), controller("b", OURS, keeps))
+    plant = Plant(Config(controllers=both if controllers == 1 else one_each), Port(HEARER), stdout)
+    plant.take(heartbeat(), START)
+    with pytest.raises(LinkError, match="cannot write JSON lines"):
+        plant.tick(START)
+    with contextlib.closing(Journal(str(tmp_path / "s-new"), 0)) as journal:
+        assert [json.loads(event.text)["robot"] for event in journal.left] == ["r"]
+    with contextlib.suppress(LinkError):
+        plant.close(START)
 
 
 def test_a_controller_that_fails_is_stopped_and_the_others_go_on(

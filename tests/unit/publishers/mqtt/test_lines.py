@@ -12,7 +12,7 @@ from mav_robot_status.interface import (
     TriState,
     Vehicle,
 )
-from mav_robot_status.publishers.mqtt.lines import event_of, line_of, unknown
+from mav_robot_status.publishers.mqtt.lines import event_of, line_of, members_of, unknown
 
 BEFORE = RobotStatus(RobotMode.MANUAL, in_error=TriState.FALSE), Detail(1, 1)
 AFTER = (
@@ -20,6 +20,7 @@ AFTER = (
     Detail(1, 1, errors=(ErrorCause(3, "BATTERY", None, 0),), vehicle=Vehicle(flight_mode="AUTO")),
 )
 MSG = RobotStatusMsg("rover", 1_000_000, *AFTER, 0.5)
+OLD, NEW = members_of(RobotStatusMsg("rover", 0, *BEFORE, 0.5)), members_of(MSG)
 
 
 def test_a_status_is_the_native_line() -> None:
@@ -28,7 +29,7 @@ def test_a_status_is_the_native_line() -> None:
 
 
 def test_an_event_has_an_id_and_tells_only_what_changed() -> None:
-    event = event_of(MSG, BEFORE, "r1", "abcd", 9)
+    event = event_of(MSG, OLD, NEW, "r1", "abcd", 9)
     assert (event["id"], event["session"], event["seq"], event["robot"]) == ("abcd-9", "abcd", 9, "r1")
     assert event["stamp"] == "1970-01-01T00:00:01.000000Z"
     assert event["changed"].keys() == {"mode", "in_error", "error_code", "errors", "vehicle.flight_mode"}
@@ -37,7 +38,7 @@ def test_an_event_has_an_id_and_tells_only_what_changed() -> None:
 
 
 def test_the_first_event_tells_all_members() -> None:
-    changed = event_of(MSG, None, "r1", "abcd", 1)["changed"]
+    changed = event_of(MSG, {}, NEW, "r1", "abcd", 1)["changed"]
     assert {change["old"] for change in changed.values()} == {None}
     assert changed["link.state"]["new"] == LinkState.CONNECTED.value
 

@@ -15,7 +15,9 @@ import pytest
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import UsageError
 from mav_robot_status.interface import Detail, PublisherContext, RobotMode, RobotStatus, RobotStatusMsg
+from mav_robot_status.publishers.mqtt.journal import Journal
 from mav_robot_status.publishers.mqtt.publisher import MqttPublisher
+from mav_robot_status.publishers.mqtt.spool import Event
 
 from ..port import Port
 
@@ -81,6 +83,40 @@ def test_a_second_robot_of_the_same_name_is_left_out(
 
 def test_a_robot_without_a_name_waits_for_it(publish: Callable[..., list[dict[str, Any]]]) -> None:
     assert [event["system"] for event in publish(msg(MANUAL, system=None), msg(MANUAL))] == [1]
+
+
+def test_an_event_is_on_the_disk_when_publish_returns(spool: Path) -> None:
+    options = {"url": NOBODY, "spool": str(spool), "robot": "r{system}"}
+    with closing(MqttPublisher(PublisherContext(options, Port(), io.StringIO()))) as publisher:
+        for number, status in enumerate((MANUAL, AUTO, MANUAL), start=1):
+            publisher.publish(msg(status))
+            with closing(Journal(f"{spool}-new", 0)) as as_after_a_kill:
+                assert [json.loads(event.text)["seq"] for event in as_after_a_kill.left] == list(range(1, number + 1))
+
+
+def test_what_a_kill_kept_from_the_spool_comes_first_in_the_next_run(
+    publish: Callable[..., list[dict[str, Any]]], spool: Path
+) -> None:
+    assert [event["seq"] for event in publish(msg(MANUAL))] == [1]
+    with closing(Journal(f"{spool}-new", 1)) as killed:
+        killed.keep(Event(2, "r1", 0.0, '{"seq": 2}'))
+    assert [event["seq"] for event in publish(msg(AUTO), msg(MANUAL))] == [1, 2, 1, 2]
+
+
+def test_a_status_of_after_a_change_in_the_same_round_is_the_one_that_is_told(
+    spool: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = {"url": NOBODY, "spool": str(spool), "robot": "r{system}"}
+    with closing(MqttPublisher(PublisherContext(options, Port(), io.StringIO()))) as publisher:
+        told: list[RobotMode] = []
+        assert publisher._courier is not None
+        monkeypatch.setattr(
+            publisher._courier, "hand_over", lambda new: told.extend(m.status.mode for m in new.values())
+        )
+        for status in (MANUAL, AUTO, AUTO):
+            publisher.publish(msg(status))
+        publisher.service(Instant(0.0, 0))
+        assert told == [RobotMode.AUTO]
 
 
 def test_a_replay_says_nothing(publish: Callable[..., list[dict[str, Any]]], spool: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from mav_robot_status.errors import LinkError
 from mav_robot_status.publishers.mqtt import spool as module
-from mav_robot_status.publishers.mqtt.spool import CLOCK_SET, OVERHEAD, RETRY, SWEEP, Spool
+from mav_robot_status.publishers.mqtt.spool import CLOCK_SET, OVERHEAD, RETRY, SWEEP, Event, Spool
 
 
 @pytest.fixture
@@ -28,9 +28,13 @@ def spool(path: str) -> Iterator[Spool]:
     made.close(0.0, 0.0)
 
 
+def add(spool: Spool, text: str, robot: str = "r", at: float = 0.0) -> None:
+    spool.add(Event(spool._place + 1, robot, at, text))
+
+
 def fill(spool: Spool, *texts: str, robot: str = "r", at: float = 0.0, now: float = 0.0) -> None:
     for text in texts:
-        spool.add(robot, text, at)
+        add(spool, text, robot, at)
     spool.flush(now, at)
 
 
@@ -67,6 +71,25 @@ def test_what_waits_outlives_its_process(path: str) -> None:
     fill(again, "c")
     assert texts(again) == ["a", "b", "c"]
     again.close(0.0, 0.0)
+
+
+def test_places_rise_for_ever_also_after_everything_was_delivered(path: str) -> None:
+    made = Spool(path, 10_000, 100.0)
+    fill(made, "a", "b")
+    for event in made.after("r", 0, 2):
+        made.done(event)
+    made.flush(0.0, 0.0)
+    made.close(0.0, 0.0)
+    again = Spool(path, 10_000, 100.0)
+    assert (again.last, again.waiting) == (2, 0)
+    again.close(0.0, 0.0)
+
+
+def test_a_place_counts_as_last_only_when_it_is_on_the_disk(spool: Spool) -> None:
+    add(spool, "a", "late")
+    assert (spool.last, spool.robots()) == (0, ["late"])
+    spool.flush(0.0, 0.0)
+    assert (spool.last, spool.robots()) == (1, ["late"])
 
 
 def test_a_second_gateway_is_told_to_take_another_file(spool: Spool, path: str) -> None:
@@ -131,21 +154,25 @@ def test_while_the_disk_is_full_events_wait_in_memory(spool: Spool, caplog: pyte
     fill(spool, "b" * 8000)
     fill(spool, "c", now=2 * RETRY)
     assert spool.failed
+    assert (spool.last, spool.settled) == (1, 1)
     assert [text[0] for text in texts(spool)] == ["a", "b", "c"]
     for event in spool.after("r", 0, 2):
         spool.done(event)
     assert texts(spool) == ["c"]
-    spool._db.execute("PRAGMA max_page_count = 100000")
+    add(spool, "d" * 8000)
     spool.flush(4 * RETRY, 0.0)
+    assert (spool.last, spool.settled) == (1, 2)  # the second was delivered, and never on the disk
+    spool._db.execute("PRAGMA max_page_count = 100000")
+    spool.flush(6 * RETRY, 0.0)
     assert not spool.failed
-    assert (texts(spool), spool.waiting) == (["c"], 1)
+    assert ([text[0] for text in texts(spool)], spool.waiting, spool.settled) == (["c", "d"], 2, 4)
     assert len([r for r in caplog.records if r.levelno == logging.WARNING]) == 2
 
 
 def test_memory_is_bounded_too(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_UNWRITTEN", 3)
     for text in "abcde":
-        spool.add("r", text, 0.0)
+        add(spool, text)
     assert texts(spool) == ["c", "d", "e"]
     assert spool.dropped["r"] == 2
 
@@ -169,7 +196,7 @@ def test_whatever_happens_nothing_is_lost_and_the_order_stays(
     made, expected = Spool(path, 1 << 30, 1e9), {"r": list[str](), "s": list[str]()}
     for number, (what, robot) in enumerate(steps):
         if what == "add":
-            made.add(robot, str(number), 0.0)
+            add(made, str(number), robot)
             expected[robot].append(str(number))
         elif what == "done" and (first := made.after(robot, 0, 1)):
             made.done(first[0])

@@ -30,9 +30,14 @@ def _of_clock(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     return memory.boots, memory.faults and memory.boot.at
 
 
+def _is_vetoed(memory: Memory) -> bool:
+    watch, speed = memory.watch, driving_speed(memory)
+    return outputs.is_vetoed(watch, memory.family, memory.vehicle_type, speed, memory.turning)
+
+
 def _of_attitude(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
-    seen = memory.observation.attitude
-    return seen and seen.since, memory.faults and memory.boot.at
+    seen, held = memory.observation.attitude, memory.watch.held_since is not None
+    return seen and seen.since, memory.faults and memory.boot.at, held and _is_vetoed(memory)
 
 
 def _of_global_position(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
@@ -59,13 +64,13 @@ def _of_local_position(memory: Memory, options: HardwareOptions) -> tuple[object
 
 
 def _of_vfr_hud(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
-    moving, seen, watch = memory.motion, memory.observation.vfr_hud, memory.watch
+    moving, seen = memory.motion, memory.observation.vfr_hud
     return (
         seen and seen.since,
         moving.value,
         moving.slow_since is None,
         moving.speed is None,
-        watch.held_since is not None and outputs.is_vetoed(watch, memory.family, driving_speed(memory)),
+        memory.watch.held_since is not None and _is_vetoed(memory),
     )
 
 

@@ -79,7 +79,7 @@ def _watched(view: View) -> Finding:
             return UNKNOWN, Evidence("a motor turns, perhaps without being driven", "ESC telemetry: rpm", turning.at)
     if not fresh:
         return UNKNOWN, Evidence("no fresh SERVO_OUTPUT_RAW")
-    value = outputs.verdict(watch, memory.family, memory.vehicle_type, driving_speed(memory), now)
+    value = outputs.verdict(watch, memory.family, memory.vehicle_type, driving_speed(memory), now, memory.turning)
     motors, assumed = outputs.channels(watch, memory.vehicle_type)
     shown = ", ".join(f"{c}: {watch.values[c - 1]} us" for c in motors if c <= len(watch.values))
     source = f"SERVO_OUTPUT_RAW {shown}{' (assumed motor channels)' if assumed else ''}"

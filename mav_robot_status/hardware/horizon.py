@@ -119,6 +119,12 @@ def _of_landed_state(memory: Memory, options: HardwareOptions) -> tuple[object, 
     return seen and seen.since, seen and seen.message
 
 
+def _of_estimator(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    """It is looked at with the next speed."""
+    seen = memory.observation.estimator
+    return (seen and seen.since,)
+
+
 def _of_current_mode(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     seen = memory.observation.current_mode
     return seen and seen.since, seen and seen.message
@@ -147,6 +153,7 @@ def _of_the_rest(memory: Memory, options: HardwareOptions) -> tuple[object, ...]
 PARTS: Final[Mapping[type, Part]] = {
     mav.Attitude: _of_attitude,
     mav.CurrentMode: _of_current_mode,
+    mav.EkfStatusReport: _of_estimator,
     mav.EscStatus: _of_esc,
     mav.EscTelemetry1To4: _of_esc,
     mav.EscTelemetry5To8: _of_esc,

@@ -1,7 +1,8 @@
 """e_stopped: what shows an emergency stop, by autopilot, and what shows that there is none.
 
 On ArduPilot an e-stop by RC switch or command changes neither HEARTBEAT nor, while armed, SYS_STATUS: an armed vehicle
-of which nothing more is heard is UNKNOWN. PX4 shows every stop as state FLIGHT_TERMINATION.
+of which nothing more is heard is UNKNOWN. PX4 shows every stop as state FLIGHT_TERMINATION; before 1.12 it did not, and
+only said so.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def said(stop: Stop, engaged: bool, text: str | None, now: Instant, source: str 
         source=source or f"STATUSTEXT: {text}",
         since=stop.since if stop.said is value else now,
         last=now.mono,
-        repeats=engaged and text is not None and "MotorEStop" not in text,
+        repeats=engaged and text is not None and "Emergency Stopped" in text,
         ready=0 if engaged else stop.ready,
         ready_at=stop.ready_at,
     )

@@ -28,6 +28,9 @@ def e_stopped(view: View) -> Finding:
 
 def _px4_stop(view: View) -> Finding:
     if view.state != TERMINATED:
+        stop = view.memory.stop
+        if estop.still_said(stop, view.now) is TRUE:
+            return TRUE, Evidence("the autopilot said so", stop.source, stop.last)
         return FALSE, beat(view, "PX4 shows every stop as state FLIGHT_TERMINATION")
     if view.heartbeat.base_mode & HIL:
         return UNKNOWN, beat(view, "in hardware-in-the-loop older PX4 is always in lockdown")

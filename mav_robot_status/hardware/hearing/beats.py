@@ -13,7 +13,7 @@ from ..identity import PX4
 from ..memory import Memory, begin
 from ..motion import Motion
 from ..observation import Observation, heard
-from ..pulse import armed_before, next_beat
+from ..pulse import TERMINATED, armed_before, next_beat
 from .words import pass_time
 
 if TYPE_CHECKING:
@@ -54,6 +54,8 @@ def heartbeat(memory: Memory, message: Heartbeat, now: Instant, options: Hardwar
         memory.assumed_free = False
     if pulse.armed and not before.armed:
         _armed(memory, last, now)
+    if memory.stack is PX4 and message.system_status == TERMINATED:
+        memory.stop = estop.NOTHING  # it shows its stops, and need not be believed on its word
     if pulse.calm_since == now.mono:
         memory.failsafe = None
 

@@ -9,7 +9,7 @@ from mav_robot_status.hardware.pulse import Pulse, first_beat
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink.definitions import Heartbeat, SysStatus
 
-from .driver import FITTED, MOTORS, PREARM, copter
+from .driver import ACTIVE, FITTED, MOTORS, PREARM, STANDBY, TERMINATED, copter, px4
 
 NOW = Instant(1000.0, 1_800_000_000_000_000)
 ALL = FITTED | PREARM
@@ -105,3 +105,25 @@ def test_a_stop_said_between_the_arming_and_its_heartbeat_stays() -> None:
     flight.wait(0.5)
     flight.text(HIGH, 6).hb(armed=True)
     assert flight.status.e_stopped is TriState.TRUE
+
+
+KILL, RELEASED = "Manual kill-switch engaged", "Manual kill-switch disengaged"
+
+
+def test_a_kill_that_an_old_px4_only_speaks_of_is_a_stop_until_it_says_otherwise_or_is_armed() -> None:
+    flight = px4().hb(armed=True, state=ACTIVE).text(KILL, 0)
+    flight.wait(60)
+    assert (flight.status.e_stopped, flight.status.drives_powered) == (TriState.TRUE, TriState.FALSE)
+    assert flight.text(RELEASED, 0).status.e_stopped is TriState.FALSE
+    flight.text(KILL, 0).hb(armed=False, state=STANDBY).wait(2)
+    assert flight.status.e_stopped is TriState.TRUE
+    assert flight.hb(armed=True, state=ACTIVE).status.e_stopped is TriState.FALSE
+
+
+def test_a_px4_that_shows_its_stops_is_believed_on_what_it_shows() -> None:
+    flight = px4().hb(armed=True, state=ACTIVE)
+    flight.wait(1)
+    flight.text(KILL, 0).hb(state=TERMINATED).wait(5)
+    assert flight.status.e_stopped is TriState.TRUE
+    assert [(error.code, error.text) for error in flight.detail.errors] == [(1001, KILL)]
+    assert flight.hb(state=ACTIVE).status.e_stopped is TriState.FALSE  # the word of the release was lost

@@ -56,13 +56,15 @@ def run_through(plant: Plant, recording: Iterable[Stamped]) -> Instant:
     """Feed a recording to the plant; gives the last instant of it. The plant has lived what came before the next."""
     hw = plant.hw
     last = NEVER
-    due = math.inf
+    due = -math.inf  # the first record is where it begins
     for now, frame, new_segment in recording:
         mono = now.mono
         if new_segment:
             plant.forget(last)
         elif due < mono or hw.deadline < mono:
-            if plant.next_due(last.mono, mono) < mono:
+            if last is NEVER:
+                plant.tick(now)  # vehicles that are expected have lines before they are heard
+            elif plant.next_due(last.mono, mono) < mono:
                 live_through(plant, last, now)
             due = plant.next_due(mono)
         if frame is not None:

@@ -14,6 +14,8 @@ from .identity import ARDUPILOT, Family, Stack
 from .sensors import is_ready, safety_switch_on
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from ..clock import Instant
     from ..mavlink.definitions import SysStatus
     from .pulse import Pulse
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 HONOURED_BY: Final = frozenset({Family.COPTER, Family.PLANE, Family.ROVER})
 """The ArduPilot vehicles whose motors an e-stop by switch or command stops. ArduSub 4.5.6 was recorded accepting the
 command and driving on, and the others were never seen with one."""
+ARM_EMERGENCY_STOP: Final = 165
+"""RCn_OPTION of a switch that stops in its low position, where it is parked: the pre-arm checks excuse that stop."""
 SETTLING: Final = 2.0
 """Seconds after a disarm, a connection or a word on the stop before a healthy PREARM_CHECK bit says anything: it is
 recomputed once a second, and forced healthy while armed."""
@@ -79,6 +83,11 @@ def heard_sys_status(stop: Stop, status: SysStatus, pulse: Pulse, stack: Stack, 
     if ready >= READY_MESSAGES:
         return Stop(ready=ready, ready_at=now)
     return stop._replace(ready=ready, ready_at=now)
+
+
+def is_excused(switches: Mapping[int, int]) -> bool:
+    """Whether the pre-arm checks may pass although the motors are stopped: by `switches`, RCn_OPTION by channel."""
+    return ARM_EMERGENCY_STOP in switches.values()
 
 
 def still_said(stop: Stop, now: float) -> TriState:

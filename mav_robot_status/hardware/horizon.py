@@ -86,6 +86,7 @@ def _of_outputs(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
         watch.held_since,
         memory.observation.esc and outputs.is_at_stop(watch, memory.vehicle_type),
         memory.stop.said,  # ended by a motor that is driven
+        memory.switches,
     )
 
 

@@ -52,6 +52,8 @@ class Memory:
     turning: float = 0.0
     """The rotation that the latest ATTITUDE tells, rad/s."""
     watch: outputs.Watch = field(default_factory=outputs.Watch)
+    switches: Mapping[int, int] = field(default_factory=dict)
+    """RCn_OPTION by channel, as far as heard."""
     texts: statustext.Assembly = statustext.EMPTY
     modes: Mapping[int, AvailableMode] = field(default_factory=dict)
     not_ready: Said | None = None

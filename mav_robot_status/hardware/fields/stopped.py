@@ -54,6 +54,10 @@ def _ardupilot_stop(view: View) -> Finding:
     if watched is TRUE:
         return TRUE, why
     if not view.armed and view.status is not None and stop.ready >= estop.READY_MESSAGES:
+        if estop.is_excused(memory.switches):
+            return UNKNOWN, Evidence(
+                "the pre-arm checks pass, but excuse a stop by the switch of option 165", "PARAM_VALUE: RCn_OPTION"
+            )
         return FALSE, Evidence(
             "the pre-arm checks, which include the stop, pass", "SYS_STATUS: PREARM_CHECK", stop.ready_at
         )

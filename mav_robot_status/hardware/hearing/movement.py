@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from struct import unpack
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from ..options import HardwareOptions
 
 
+_NUMBERED: Final = re.compile(rb"SERVO(\d{1,2})_FUNCTION|RC(\d{1,2})_OPTION")
 FIX_3D: Final = 3  # GPS_FIX_TYPE
 NO_SPEED: Final = 0xFFFF  # GPS_RAW_INT.vel
 CONST_POS_MODE: Final = 0x80  # EKF_STATUS_FLAGS: nothing measures where it is, and the estimator takes it to stand
@@ -214,15 +216,17 @@ def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, 
 
 
 def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: HardwareOptions) -> None:
-    """PARAM_VALUE: SERVOn_FUNCTION says which outputs drive motors."""
-    name = message.param_id.split(b"\0")[0]
-    number, value = name[5:-9], message.param_value
-    if not (name.startswith(b"SERVO") and name.endswith(b"_FUNCTION") and number.isdigit() and math.isfinite(value)):
+    """PARAM_VALUE: SERVOn_FUNCTION says which outputs drive motors, RCn_OPTION what the switches do."""
+    found, value = _NUMBERED.fullmatch(message.param_id.split(b"\0")[0]), message.param_value
+    if found is None or not math.isfinite(value) or memory.stack is not ARDUPILOT:
         return
-    channel = int(number)
-    if not 1 <= channel <= 32 or memory.stack is not ARDUPILOT:
+    channel = int(found[1] or found[2])
+    if not 1 <= channel <= 32:
         return
-    memory.watch.name({**memory.watch.functions, channel: int(value)})
+    if found[1]:
+        memory.watch.name({**memory.watch.functions, channel: int(value)})
+    else:
+        memory.switches = {**memory.switches, channel: int(value)}
 
 
 def esc_telemetry(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:

@@ -122,8 +122,7 @@ def _of_landed_state(memory: Memory, options: HardwareOptions) -> tuple[object, 
 
 def _of_estimator(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     """It is looked at with the next speed."""
-    seen = memory.observation.estimator
-    return (seen and seen.since,)
+    return ()
 
 
 def _of_current_mode(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:

@@ -78,8 +78,6 @@ class Observation:
     gps: Heard | None = None
     """GPS_RAW_INT with a fix and a speed."""
     attitude: Heard | None = None
-    estimator: Heard | None = None
-    """EKF_STATUS_REPORT of ArduPilot."""
     current_mode: Heard | None = None
     esc: Heard | None = None
     """The latest ESC telemetry that showed a turning motor."""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _NUMBERED: Final = re.compile(rb"SERVO(\d{1,2})_FUNCTION|RC(\d{1,2})_OPTION")
 FIX_3D: Final = 3  # GPS_FIX_TYPE
 NO_SPEED: Final = 0xFFFF  # GPS_RAW_INT.vel
+ESTIMATOR_FRESH: Final = 10.0  # s
 CONST_POS_MODE: Final = 0x80  # EKF_STATUS_FLAGS: nothing measures where it is, and the estimator takes it to stand
 
 
@@ -109,8 +110,7 @@ def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: Hardw
 
 def ekf_status_report(memory: Memory, message: mav.EkfStatusReport, now: Instant, options: HardwareOptions) -> None:
     """EKF_STATUS_REPORT: whether ArduPilot's speed is measured."""
-    seen = memory.observation
-    seen.estimator = heard(message, now.mono, seen.estimator)
+    memory.unaided, memory.unaided_at = bool(message.flags & CONST_POS_MODE), now.mono
 
 
 def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
@@ -145,12 +145,11 @@ def _measured(
 
     Then the climb, from the barometer or the water's pressure, is all that can tell, and only of motion.
     """
-    estimator = memory.observation.estimator
-    if is_fresh(estimator, now, motion.FRESH):
-        if estimator is not None and estimator.message.flags & CONST_POS_MODE:
-            return None if memory.family is ROVER else _if_fast(memory, abs(climb), options)
+    if now - memory.unaided_at > ESTIMATOR_FRESH:
+        return _if_fast(memory, speed, options) if nowhere else speed
+    if not memory.unaided:
         return speed
-    return _if_fast(memory, speed, options) if nowhere else speed
+    return None if memory.family is ROVER else _if_fast(memory, abs(climb), options)
 
 
 def _if_fast(memory: Memory, speed: float, options: HardwareOptions) -> float | None:

@@ -260,7 +260,7 @@ def test_a_rover_that_loses_its_position_while_it_drives_is_not_called_still() -
     estimating(flight, CONSTANT)
     assert moving(flight, lambda: here(flight, 0.05, 0, 0), 5) is UNKNOWN
     flight.stop("estimator")
-    assert moving(flight, lambda: here(flight, 0.05, 0, 0), 12) is FALSE
+    assert moving(flight, lambda: here(flight, 0.05, 0, 0), 15) is FALSE
 
 
 def test_a_small_speed_without_a_place_is_no_estimate_unless_the_estimator_says_so() -> None:

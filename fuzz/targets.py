@@ -14,8 +14,8 @@ from mav_robot_status.hardware.kinds import WANTED_IDS
 from mav_robot_status.hardware.options import HardwareOptions
 from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
 from mav_robot_status.link.url import parse
-from mav_robot_status.mavlink.decode import decode
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
+from mav_robot_status.mavlink.encode import enclose
 from mav_robot_status.mavlink.framing import MAX_FRAME, Frame, Parser
 from mav_robot_status.mavlink.signing import Signer, Verifier, is_signed
 
@@ -34,7 +34,6 @@ def framing(data: bytes) -> int:
         taken = 0
         for start in range(0, len(data), PIECE):
             for frame in parser.feed(data[start : start + PIECE]):
-                decode(frame)
                 taken += len(frame.raw)
             assert parser.pending <= MAX_FRAME
         assert taken + parser.pending + parser.counters.garbage_bytes <= len(data)
@@ -47,6 +46,7 @@ def framing(data: bytes) -> int:
 def messages(data: bytes) -> int:
     """Frames with a good CRC and any payload, at any time, of three vehicles: hardware and status hold."""
     hw = MavlinkRobotHW(HardwareOptions())
+    parser = Parser(WANTED_IDS)
     mono, count = 0.0, 0
     for chunk in _chunks(data):
         count += 1
@@ -54,7 +54,8 @@ def messages(data: bytes) -> int:
         system = chunk[1] % 3
         message_id = 0 if count <= 3 else SOME[chunk[2] % len(SOME)]
         now = Instant(mono, int(mono * 1e6))
-        hw.take(Frame(message_id, system, 1, count & 255, chunk[3:], b"", 2), now)
+        (frame,) = parser.feed(enclose(message_id, chunk[3:], system=system, component=1, sequence=count & 255))
+        hw.take(frame, now)
         if hw.stirred or mono >= hw.next_due():
             hw.read(now)
             hw.write(now)
@@ -83,7 +84,7 @@ def signing(data: bytes) -> int:
         accepted = verifier.accepts(frame, 1_800_000_000_000_000)
         assert not accepted or is_signed(frame)
     raw = b"\xfd" + data[:279]
-    verifier.accepts(Frame(0, 1, 1, 0, b"", raw, 2), 0)
+    verifier.accepts(Frame(0, 1, 1, 0, None, raw), 0)
     return count + 1
 
 

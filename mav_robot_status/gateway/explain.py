@@ -13,7 +13,6 @@ from ..clock import Instant, later, rfc3339
 from ..clock import now as present
 from ..errors import UsageError
 from ..interface import RobotMode, TriState
-from ..link.log import Stamped
 from .live import Live
 from .plant import DEFAULT_CONTROLLER, Plant
 from .recorded import Recording
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from ..hardware.robot_hw import MavlinkRobotHW
     from ..hardware.tracked import Tracked
     from ..interface import RobotStatus
+    from ..link.log import Stamped
 
 LISTEN: Final = 5.0
 """Seconds after the first heartbeat until a live link is explained: by then slow streams were heard twice."""
@@ -50,13 +50,13 @@ def _up_to(recording: Iterable[Stamped], at: str | None) -> Iterator[Stamped]:
     until: int | None = None
     last: Instant | None = None
     for stamped in recording:
-        now = stamped.now
+        now = stamped[0]
         if last is None and at is not None:
             until = moment(at, now.unix_us)
             if until < now.unix_us:
                 raise UsageError(f"--at {at}: the log begins at {rfc3339(now.unix_us)}")
         if last is not None and until is not None and now.unix_us > until:
-            yield Stamped(later(last, (until - last.unix_us) / 1e6), None, False)
+            yield later(last, (until - last.unix_us) / 1e6), None, False
             return
         yield stamped
         last = now

@@ -8,7 +8,6 @@ clocks: one vehicle has booted at one time, whichever way it is heard.
 from __future__ import annotations
 
 import math
-from struct import Struct
 from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 if TYPE_CHECKING:
@@ -27,9 +26,8 @@ MOST_WAYS: Final = 8
 FRESH: Final = 3.0
 """Seconds for which a boot time stands as evidence: after a reboot one way tells it before the other."""
 
-CLOCK = Struct("<I").unpack_from
-CLOCKS: Final = {2: 8, 30: 0, 31: 0, 32: 0, 33: 0}
-"""Where time_boot_ms stands, by message id (SYSTEM_TIME, ATTITUDE, positions)."""
+CLOCKS: Final = frozenset({2, 30, 32, 33})
+"""Message ids with time_boot_ms: SYSTEM_TIME, ATTITUDE, positions."""
 
 
 C = TypeVar("C")
@@ -147,8 +145,7 @@ def _remember(path: Path[C], way: Way[C]) -> None:
 
 
 def _note_clock(way: Way[C], frame: Frame, now: float) -> None:
-    offset = CLOCKS[frame.message_id]
-    way.booted = now - CLOCK(frame.payload.ljust(offset + 4, b"\0"), offset)[0] / 1000
+    way.booted = now - frame.message.time_boot_ms / 1000
     way.clock_at = now
 
 

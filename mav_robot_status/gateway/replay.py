@@ -55,6 +55,7 @@ def replay(config: Config, path: str, stdout: TextIO) -> None:
 def run_through(plant: Plant, recording: Iterable[Stamped]) -> Instant:
     """Feed a recording to the plant; gives the last instant of it. The plant has lived what came before the next."""
     hw = plant.hw
+    take = hw.take
     last = NEVER
     due = -math.inf  # the first record is where it begins
     for now, frame, new_segment in recording:
@@ -64,11 +65,13 @@ def run_through(plant: Plant, recording: Iterable[Stamped]) -> Instant:
         elif due < mono or hw.deadline < mono:
             if last is NEVER:
                 plant.tick(now)  # vehicles that are expected have lines before they are heard
-            elif plant.next_due(last.mono, mono) < mono:
+                last = now
+            due = plant.next_due(last.mono, mono)
+            if due < mono:
                 live_through(plant, last, now)
-            due = plant.next_due(mono)
+                due = plant.next_due(mono)
         if frame is not None:
-            hw.take(frame, now)
+            take(frame, now)
             if hw.stirred:
                 plant.tick(now)
                 due = plant.next_due(mono)

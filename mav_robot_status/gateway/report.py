@@ -46,8 +46,9 @@ def _segments(recording: Recording, observer: Observer, progress: Callable[[floa
     """The recording; the observer is told where a segment begins."""
     first = True
     for stamped in recording:
-        if first or stamped.new_segment:
-            observer.begin(stamped.now)
+        now, _, new_segment = stamped
+        if first or new_segment:
+            observer.begin(now)
             first = False
         yield stamped
         progress(recording.share)

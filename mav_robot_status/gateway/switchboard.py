@@ -12,7 +12,6 @@ from ..config import Config
 from ..hardware.kinds import COMMAND_IDS, WANTED_IDS
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
-from ..mavlink.decode import decode
 from ..mavlink.signing import Verdict
 from .paths import Paths
 from .routing import Router
@@ -192,7 +191,7 @@ class Switchboard:
         hears_statuses = self._hears_statuses(channel.station)
         offered = self.offered if hears_statuses else self.offered - {ROBOT_STATUS}
         sender = frame.system, frame.component
-        found = answer(decode(frame), sender, self.voice.component.speaks_as, channel.interval, offered)
+        found = answer(frame.message, sender, self.voice.component.speaks_as, channel.interval, offered)
         if found is None:
             return
         for reply in found.replies:

@@ -11,7 +11,8 @@ from typing import Final
 
 STEP_BACK_MS: Final = 2000
 STEP_BACK: Final = STEP_BACK_MS / 1000  # seconds
-WRAP: Final = 1 << 32
+WRAP: Final = 1 << 32  # of a clock of 32 bits
+HALF: Final = WRAP // 2
 GRACE: Final = 10.0
 """Seconds after boot during which sensor bits raise no error."""
 
@@ -35,9 +36,9 @@ def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> bool:
     """One more sample; whether it shows a reboot."""
     booted = now - time_boot_ms / 1000
     clock_ms = boot.clock_ms
-    step = 1 if clock_ms is None else _difference(time_boot_ms, clock_ms)
+    step = 1 if clock_ms is None else (time_boot_ms - clock_ms + HALF) % WRAP - HALF  # after 49 days it wraps
     if step > 0:
-        # on its way a sample is only ever held up, so the earliest boot is the truest; after 49 days the clock wraps
+        # on its way a sample is only ever held up, so the earliest boot is the truest
         if clock_ms is None or not 0 <= booted - boot.at < STEP_BACK:
             boot.at = booted
         boot.clock_ms = time_boot_ms
@@ -46,14 +47,9 @@ def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> bool:
     if step >= -STEP_BACK_MS:
         boot.doubt_ms = None
         return False
-    if boot.doubt_ms is None or _difference(time_boot_ms, boot.doubt_ms) < 0:
+    if boot.doubt_ms is None or (time_boot_ms - boot.doubt_ms + HALF) % WRAP < HALF:
         boot.doubt_ms = time_boot_ms
         return False
     boot.in_turn = boot.shown is not None and abs(booted - boot.shown) < STEP_BACK_MS / 1000
     boot.at, boot.clock_ms, boot.doubt_ms, boot.shown = booted, time_boot_ms, None, booted
     return True
-
-
-def _difference(a: int, b: int) -> int:
-    """a - b on a 32-bit clock that may have wrapped."""
-    return (a - b + WRAP // 2) % WRAP - WRAP // 2

@@ -13,6 +13,7 @@ from ..mavlink import definitions as mav
 from . import boot, causes, estop, motion, outputs, sensors, statustext
 from .flight_mode import CURRENT_MODE_FRESH
 from .hearing.movement import driving_speed, speed_over_ground
+from .motion import FALSE, TRUE, UNKNOWN
 from .observation import slowly_fresh_until
 
 if TYPE_CHECKING:
@@ -46,10 +47,15 @@ def _of_global_position(memory: Memory, options: HardwareOptions) -> tuple[objec
         seen and seen.since,
         memory.faults and memory.boot.at,
         moving.value,
-        moving.slow_since is None,
+        moving.value is UNKNOWN and moving.slow_since is None,
         moving.speed is None,
-        not memory.pulse.armed and speed_over_ground(memory) > options.v_on_disarmed,
+        _may_contradict(memory) and speed_over_ground(memory) > options.v_on_disarmed,
     )
+
+
+def _may_contradict(memory: Memory) -> bool:
+    """Whether the receiver stands still while the estimate of a disarmed vehicle moves."""
+    return memory.motion.value is TRUE and memory.gps_motion.value is FALSE and not memory.pulse.armed
 
 
 def _of_local_position(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
@@ -58,7 +64,7 @@ def _of_local_position(memory: Memory, options: HardwareOptions) -> tuple[object
         seen and seen.since,
         memory.faults and memory.boot.at,
         moving.value,
-        moving.slow_since is None,
+        moving.value is UNKNOWN and moving.slow_since is None,
         moving.speed is None,
     )
 
@@ -68,7 +74,7 @@ def _of_vfr_hud(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     return (
         seen and seen.since,
         moving.value,
-        moving.slow_since is None,
+        moving.value is UNKNOWN and moving.slow_since is None,
         moving.speed is None,
         memory.watch.held_since is not None and _is_vetoed(memory),
     )

@@ -14,7 +14,7 @@ from ..interface.status import TriState
 if TYPE_CHECKING:
     from .options import HardwareOptions
 
-TRUE, FALSE = TriState.TRUE, TriState.FALSE
+TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 RATE_ON, RATE_OFF = 0.15, 0.08  # rad/s
 SUSTAIN_ON, SUSTAIN_OFF = 0.3, 1.0  # seconds
 FRESH: Final = 2.5  # seconds, or three measured intervals
@@ -24,7 +24,7 @@ FRESH: Final = 2.5  # seconds, or three measured intervals
 class Motion:
     """What speed and rotation have said so far: a record that each sample changes in place."""
 
-    value: TriState = TriState.UNKNOWN
+    value: TriState = UNKNOWN
     fast_since: float | None = None
     """Since when above the upper thresholds."""
     slow_since: float | None = None
@@ -42,6 +42,11 @@ def settled(motion: Motion, now: float) -> TriState:
     return motion.value
 
 
+def settle(motion: Motion, now: float) -> None:
+    """Let time pass up to `now`: the next sample then finds the value that the status has."""
+    motion.value = settled(motion, now)
+
+
 def settles_at(motion: Motion) -> float:
     """When (monotonic seconds) `settled` will find another value if no sample comes; infinity: never."""
     if motion.fast_since is not None:
@@ -53,7 +58,7 @@ def settles_at(motion: Motion) -> float:
 
 def moved(motion: Motion, speed: float | None, rate: float, armed: bool, options: HardwareOptions, now: float) -> None:
     """One more sample: `speed` in m/s (None: not measured, which ends all that was known), `rate` in rad/s."""
-    motion.value = settled(motion, now) if speed is not None else TriState.UNKNOWN
+    motion.value = settled(motion, now) if speed is not None else UNKNOWN
     motion.speed = speed
     on = options.v_on if armed else options.v_on_disarmed
     off = options.v_off if armed else options.v_off_disarmed

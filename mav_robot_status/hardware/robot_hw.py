@@ -19,7 +19,6 @@ from ..interface import (
     RobotStatus,
 )
 from ..mavlink import definitions as mav
-from ..mavlink.decode import decode
 from . import causes, horizon, motion
 from .asking import Ask, Asking
 from .derive import derive
@@ -92,14 +91,13 @@ class MavlinkRobotHW(RobotHW):
 
     def take(self, frame: Frame, now: Instant) -> Tracked | None:
         """Take one frame. Returns the vehicle whose autopilot's heartbeat it is, None for everything else."""
-        message_id = frame.message_id
+        message_id, system, component, _, message, _, _ = frame
         kind = KINDS.get(message_id)
         if kind is None:
             if message_id in COMMAND_IDS:
                 self._overhear(frame, now)
             return None
-        tracked = self._tracked.get((frame.system, frame.component))
-        message = decode(frame)
+        tracked = self._tracked.get((system, component))
         beating = None
         if message_id == HEARTBEAT_ID:
             tracked = beating = self._beating(tracked, message, frame, now)
@@ -231,7 +229,7 @@ class MavlinkRobotHW(RobotHW):
 
     def _overhear(self, frame: Frame, now: Instant) -> None:
         """A command of a ground station to one of the vehicles."""
-        message = decode(frame)
+        message = frame.message
         for (system, component), tracked in self._tracked.items():
             addressed = message.target_system == system and message.target_component in (0, component)
             if addressed and tracked.memory is not None:
@@ -290,6 +288,8 @@ class MavlinkRobotHW(RobotHW):
         if memory.boots != tracked.boots:
             self._tell_reboot(tracked, memory, now)
         pass_time(memory, now, self.options)
+        motion.settle(memory.motion, now.mono)
+        motion.settle(memory.gps_motion, now.mono)
         handle = tracked.handle
         derived = derive(memory, tracked.ids, handle.detail, now, self.options)
         self._log_link(tracked, derived.detail.link)

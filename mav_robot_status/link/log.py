@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import UsageError
@@ -20,8 +20,8 @@ DAY_US = 86_400_000_000
 """A longer step forward is a clock that was set; a shorter one is silence, and is lived through as it was live."""
 
 _LATEST = 1 << 51  # microseconds, in 2041
-BLOCK = 1 << 16
-"""Bytes handed on at once."""
+BLOCK = 1 << 13
+"""Bytes handed on at once: so few that Python never looks through what is made of them in search of garbage."""
 
 new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
 
@@ -38,14 +38,12 @@ class Counts:
     """Jumps of the clock that lasted; each started a new segment."""
 
 
-class Stamped(NamedTuple):
-    """When something in a log was heard."""
+Stamped = tuple[Instant, Any, bool]
+"""When something in a log was heard, what, and whether it begins a new segment.
 
-    now: Instant
-    """`mono` never decreases, `unix_us` is the log's stamp, corrected."""
-    what: Any
-    new_segment: bool
-    """True where the log's clock has jumped for good: what was known before is of another time."""
+`mono` never decreases, `unix_us` is the log's stamp, corrected. A new segment begins where the log's clock has jumped
+for good: what was known before is of another time.
+"""
 
 
 class _Record(Protocol):
@@ -75,7 +73,7 @@ def timed(records: Iterable[_Record], last: Callable[[], int], counts: Counts) -
         # Nearly every record is neither before the last one nor after the next one.
         if latest <= stamp <= next_stamp and stamp <= limit:
             latest = stamp
-            yield new(Stamped, (new(Instant, (mono + (stamp - segment) * 1e-6, stamp)), record, False))
+            yield new(Instant, (mono + (stamp - segment) * 1e-6, stamp)), record, False
         elif record is not None:
             clock.latest = latest
             yield clock.stamped(record, stamp, next_stamp)
@@ -124,7 +122,7 @@ class _Clock:
             self._counts.held += 1
             stamp = latest
         self.latest = stamp
-        return Stamped(Instant(self.mono + (stamp - self.segment) * 1e-6, stamp), what, jumped)
+        return Instant(self.mono + (stamp - self.segment) * 1e-6, stamp), what, jumped
 
 
 def follows(earlier: int, later: int) -> bool:

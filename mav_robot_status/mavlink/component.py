@@ -41,7 +41,7 @@ class Component:
         self._encoders: dict[int, Encoder] = {}
         self._systems: set[int] = set()
         """Systems that we speak for."""
-        self._sent: dict[int, deque[tuple[int, int, bytes]]] = {}
+        self._sent: dict[int, deque[tuple[int, int, Heartbeat]]] = {}
 
     def system_for(self, vehicle: int) -> int:
         """Our system id when we speak about this vehicle."""
@@ -68,7 +68,7 @@ class Component:
         frame = encoder.frame(message)
         if type(message) is Heartbeat:
             sent = self._sent.setdefault(system, deque(maxlen=REMEMBERED))
-            sent.append((self.id, sequence, frame[10:-2]))
+            sent.append((self.id, sequence, message))
         return frame
 
     def heartbeat(self, vehicle: int, in_error: bool = False, encoders: dict[int, Encoder] | None = None) -> bytes:
@@ -80,7 +80,7 @@ class Component:
         """Look at a HEARTBEAT: if another program speaks as we do, or as we could, keep out of its way."""
         if frame.component not in self._ids:
             return
-        if (frame.component, frame.sequence, frame.payload) in self._sent.get(frame.system, ()):
+        if (frame.component, frame.sequence, frame.message) in self._sent.get(frame.system, ()):
             return  # our own, come back through a router
         if (frame.system, frame.component) not in self._others:
             self._others.add((frame.system, frame.component))

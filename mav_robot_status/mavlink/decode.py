@@ -1,33 +1,31 @@
-"""From a frame to its message, for the few messages that we read."""
+"""From a payload to its message, for the few messages that we read."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from .definitions import MESSAGES
 
 if TYPE_CHECKING:
-    from .framing import Frame
+    from collections.abc import Callable
 
 
-READERS: Final = {d.id: (d.type, d.layout.size, d.layout.unpack) for d in MESSAGES.values()}
-new: Final = tuple.__new__  # as in `framing`
-
-
-def decode(frame: Frame) -> Any:
-    """The message in a frame: one of the NamedTuples of `definitions`, or None if the id is not in MESSAGES.
+class Reader(NamedTuple):
+    """How one kind of message is read.
 
     A payload that MAVLink 2 trimmed, or that an older definition without the extension fields made shorter, is filled
-    up with zeros; bytes beyond the layout (a newer definition) are ignored. Never raises.
+    up with zeros before; bytes beyond the layout (a newer definition) are ignored.
     """
-    reader = READERS.get(frame.message_id)
-    if reader is None:
-        return None
-    kind, size, unpack = reader
-    payload = frame.payload
-    if len(payload) != size:
-        payload = payload[:size].ljust(size, b"\0")
-    return new(kind, unpack(payload))
+
+    type: type
+    size: int
+    """Bytes of all its fields."""
+    unpack: Callable[..., tuple[Any, ...]]
+    """The fields that are in a payload, from an offset on."""
+
+
+READERS: Final = {d.id: Reader(d.type, d.layout.size, d.layout.unpack_from) for d in MESSAGES.values()}
+"""By message id: for those in MESSAGES."""
 
 
 def text(raw: bytes) -> str:

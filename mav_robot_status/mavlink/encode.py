@@ -16,9 +16,9 @@ HEADER_V1: Final = struct.Struct("<BBBBBB").pack
 HEADER_V2: Final = struct.Struct("<BBBBBBBHB").pack
 CHECKSUM: Final = struct.Struct(">H").pack
 
-# type of the message -> its id, the packing of its fields, its CRC_EXTRA with mirrored bits
-LAYOUTS: Final[dict[type, tuple[int, Callable[..., bytes], bytes]]] = {
-    d.type: (d.id, d.layout.pack, MIRROR[CRC_EXTRA[d.id] : CRC_EXTRA[d.id] + 1]) for d in MESSAGES.values()
+# type of the message -> its id, the packing of its fields
+LAYOUTS: Final[dict[type, tuple[int, Callable[..., bytes]]]] = {
+    d.type: (d.id, d.layout.pack) for d in MESSAGES.values()
 }
 
 
@@ -30,20 +30,29 @@ def encode(message: NamedTuple, *, system: int, component: int, sequence: int, v
     value that does not fit its field or the header, an id over 255 in MAVLink 1. Arrays are cut or zero-filled to fit.
     """
     try:
-        message_id, pack, crc_extra = LAYOUTS[type(message)]
+        message_id, pack = LAYOUTS[type(message)]
         payload = pack(*message)
         if version == 2:
             payload = payload.rstrip(b"\0") or b"\0"
-            id_low, id_high = message_id & 0xFFFF, message_id >> 16
-            frame = HEADER_V2(V2, len(payload), 0, 0, sequence, system, component, id_low, id_high) + payload
-        else:
-            frame = HEADER_V1(V1, len(payload), sequence, system, component, message_id) + payload
+        return enclose(message_id, payload, system=system, component=component, sequence=sequence, version=version)
     except KeyError:
         raise ValueError(f"{type(message).__name__} is not a message of mavlink.definitions") from None
     except (struct.error, OverflowError, TypeError) as error:
         where = f"system {system}, component {component}, sequence {sequence}, MAVLink {version}"
         raise ValueError(f"{message} ({where}) does not fit its frame: {error}") from None
-    return with_crc(frame, crc_extra)
+
+
+def enclose(message_id: int, payload: bytes, *, system: int, component: int, sequence: int, version: int = 2) -> bytes:
+    """The unsigned frame of a payload as it is; the id is one of CRC_EXTRA.
+
+    Raises struct.error if a value does not fit.
+    """
+    if version == 2:
+        id_low, id_high = message_id & 0xFFFF, message_id >> 16
+        frame = HEADER_V2(V2, len(payload), 0, 0, sequence, system, component, id_low, id_high) + payload
+    else:
+        frame = HEADER_V1(V1, len(payload), sequence, system, component, message_id) + payload
+    return with_crc(frame, MIRROR[CRC_EXTRA[message_id] : CRC_EXTRA[message_id] + 1])
 
 
 def with_crc(frame: bytes, crc_extra: bytes) -> bytes:

@@ -15,17 +15,20 @@ from binascii import crc_hqx
 from dataclasses import dataclass, field
 from functools import lru_cache
 from struct import Struct
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from .decode import READERS
 from .definitions import CRC_EXTRA
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Callable, Collection
+
+    from .decode import Reader
 
 MAX_FRAME: Final = 280
 """Bytes of the longest frame: header 10, payload 255, CRC 2, signature 13."""
 MAX_SOURCES: Final = 1024
-"""So many (system, component) pairs are watched for lost frames; further ones are only parsed."""
+"""So many (system, component) pairs are watched for lost frames; a further one only until another speaks."""
 MAX_IDS: Final = 256
 """So many ids have a counter of their own in each table of `Counters`."""
 OTHER_IDS: Final = -1
@@ -34,8 +37,7 @@ OTHER_IDS: Final = -1
 V1, V2 = 0xFE, 0xFD
 SIGNED = 0x01  # MAVLINK_IFLAG_SIGNED, the only incompatibility flag there is
 LATE = 240  # a gap this long is a frame that came up to 16 places late, or twice, rather than 240 lost ones
-HEADER_V1 = Struct("<xBB2sB").unpack_from  # length, sequence, system and component, id
-HEADER_V2 = Struct("<xBBxB2s3s").unpack_from  # length, incompatibility flags, sequence, system and component, id
+NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; looking it up is quicker than counting
 STAMP = Struct(">Q").unpack_from  # microseconds since 1970
 STAMP_SIZE: Final = 8
 MAGIC = re.compile(b"[\xfd\xfe]")
@@ -50,20 +52,48 @@ BACK: Final = tuple(_STEPS[low] for low in range(256))
 than adding that one. `before(extra) == BACK[crc & 255] ^ crc >> 8 ^ extra << 8`."""
 
 
+class Format(NamedTuple):
+    """How the frames of one version of MAVLink are read."""
+
+    magic: int
+    unpack: Callable[[bytes, int], tuple[Any, ...]]
+    """The header: length, incompatibility flags (version 1 has none: b""), sequence, system and component, id."""
+    header: int
+    """Bytes of it."""
+    seed: int
+    """Where the CRC starts, so that it is 0xFFFF behind the magic byte, which it does not span."""
+
+
+def _format(magic: int, header: str) -> Format:
+    layout = Struct(header)
+    return Format(magic, layout.unpack_from, layout.size, BACK[0xFF] ^ 0xFF ^ MIRROR[magic] << 8)
+
+
+FORMATS: Final = {V2: _format(V2, "<xBBxBH3s"), V1: _format(V1, "<xB0sBHB")}
+
+
 class Frame(NamedTuple):
-    """One frame with a good CRC. The payload is as received: MAVLink 2 cuts trailing zeros off."""
+    """One frame with a good CRC."""
 
     message_id: int
     system: int
     component: int
     sequence: int
-    payload: bytes
+    message: Any
+    """A message of `definitions`; None if the id is not among those."""
     raw: bytes
     """The whole frame as received, if it is signed (not verified) or the parser keeps everything; else b""."""
-    version: int
-    """1 or 2."""
     stamp: int = 0
     """Microseconds since 1970, where frames are stamped (a recorded log)."""
+
+    @property
+    def payload(self) -> bytes:
+        """As received, where `raw` is kept: MAVLink 2 cuts trailing zeros off."""
+        raw = self.raw
+        if not raw:
+            return raw
+        header = FORMATS[raw[0]].header
+        return raw[header : header + raw[1]]
 
 
 @dataclass(slots=True)
@@ -107,13 +137,22 @@ def count(table: dict[int, int], message_id: int, number: int = 1) -> None:
     table[message_id] = table.get(message_id, 0) + number
 
 
+class _Known(dict["bytes | int", "tuple[int, int | None, Reader | None]"]):
+    """What CRC_EXTRA does to a CRC, and for the wanted ones the id and how the message is read; by the id as it stands
+    in the frame (MAVLink 2: three bytes)."""
+
+    def __missing__(self, wire_id: bytes | int) -> tuple[int, None, None]:
+        """An id that cannot be checked: no CRC is negative, so that none is good."""
+        return -1, None, None
+
+
 @lru_cache(maxsize=8)
-def known_ids(wanted: frozenset[int]) -> dict[bytes | int, tuple[int, int, bool]]:
-    """What CRC_EXTRA does to a CRC, id, whether it is wanted; by the id as it stands in the frame (MAVLink 2: three
-    bytes)."""
-    known: dict[bytes | int, tuple[int, int, bool]] = {}
+def known_ids(wanted: frozenset[int]) -> _Known:
+    """All ids whose CRC_EXTRA is known."""
+    known = _Known()
     for message_id, crc_extra in CRC_EXTRA.items():
-        entry = MIRROR[crc_extra] << 8, message_id, message_id in wanted
+        reads = message_id in wanted
+        entry = MIRROR[crc_extra] << 8, message_id if reads else None, READERS.get(message_id)
         known[message_id.to_bytes(3, "little")] = known[message_id] = entry
     return known
 
@@ -126,7 +165,19 @@ class Parser:
     If it is `stamped`, each frame has its time before it, as in a recorded log.
     """
 
-    __slots__ = ("_expected", "_in_step", "_keep_all", "_lookup", "_stamp_size", "_tail", "counters", "last_stamp")
+    __slots__ = (
+        "_expected",
+        "_format",
+        "_in_step",
+        "_keep_all",
+        "_known",
+        "_speaker",
+        "_stamp_size",
+        "_tail",
+        "_upcoming",
+        "counters",
+        "last_stamp",
+    )
 
     def __init__(self, wanted: Collection[int] | None, stamped: bool = False) -> None:
         self.counters = Counters()
@@ -135,9 +186,12 @@ class Parser:
         """The stamp of the last good frame, wanted or not, where frames are stamped."""
         self._tail = b""
         self._in_step = True
-        self._expected: dict[bytes, int] = {}  # (system, component) -> sequence number of the next frame
+        self._format = FORMATS[V2]  # of the last frame: most streams have only one version, and often one speaker
+        self._speaker = 0  # system and component << 8; nobody is 0.0
+        self._upcoming: int | None = None  # the speaker's next sequence number
+        self._expected: dict[int, int] = {}  # that of the others
         self._keep_all = wanted is None
-        self._lookup = known_ids(frozenset(CRC_EXTRA if wanted is None else wanted)).get
+        self._known = known_ids(frozenset(CRC_EXTRA if wanted is None else wanted))
 
     @property
     def pending(self) -> int:
@@ -160,12 +214,13 @@ class Parser:
             data = self._tail + data
         size = len(data)
         mirrored = data.translate(MIRROR)
-        lookup = self._lookup
-        expected = self._expected
-        back = BACK
-        keep_all = self._keep_all
+        known = self._known
+        version, unpack, header, seed = self._format
+        speaker, upcoming = self._speaker, self._upcoming
+        system, component = speaker & 255, speaker >> 8
         frames: list[Frame] = []
-        good = old = 0
+        message: Any
+        good = since = old = 0
         stamped = i = self._stamp_size
         trailer, limit = 2 + stamped, size + stamped  # the CRC and the next stamp; where they may end
         before = -1
@@ -176,76 +231,85 @@ class Parser:
                 return frames
         try:
             while i < size:
-                magic = data[i]
-                if magic == V2:
-                    length, flags, sequence, source, wire_id = HEADER_V2(data, i)
-                    end = i + 10 + length
-                    following = end + trailer + 13 if flags & SIGNED else end + trailer
-                elif magic == V1:
-                    length, sequence, source, wire_id = HEADER_V1(data, i)
-                    flags = 0
-                    end = i + 6 + length
-                    following = end + trailer
-                else:
-                    i = self._hunt(data, mirrored, i)
-                    if self._in_step:
-                        continue
-                    break
+                if data[i] != version:
+                    if data[i] not in FORMATS:
+                        i = self._hunt(data, mirrored, i)
+                        if self._in_step:
+                            continue
+                        break
+                    if version == V1:
+                        old += good - since
+                    since = good
+                    self._format = version, unpack, header, seed = FORMATS[data[i]]
+                length, flags, sequence, source, wire_id = unpack(data, i)
+                end = i + header + length
+                following = end + trailer
+                if flags and flags & SIGNED:
+                    following += 13
                 if following > limit:
                     break
-                entry = lookup(wire_id)
-                if (
-                    entry is None
-                    or crc_hqx(mirrored[i + 1 : end], 0xFFFF) ^ entry[0] != back[mirrored[end + 1]] ^ mirrored[end]
-                ):
+                effect, message_id, reader = known[wire_id]
+                if crc_hqx(mirrored[i:end], seed) ^ effect != BACK[mirrored[end + 1]] ^ mirrored[end]:
+                    self._expect(speaker, upcoming)
                     doubtful = i
                     i = self._doubt(data, mirrored, i, following)
+                    upcoming = self._expected.get(speaker)
                     if self._in_step and i > doubtful:
-                        if keep_all and entry is None and i == following:
-                            frames.append(_unchecked(data, doubtful, end - length, end, following - stamped))
+                        if self._keep_all and effect < 0 and i == following:
+                            frames.append(_unchecked(data, doubtful, following - stamped))
                         continue
                     break
                 before = i
                 i = following
-                if expected.get(source) == sequence:
-                    expected[source] = (sequence + 1) & 255
-                else:
-                    self._gap(source, sequence)
+                if source != speaker:
+                    self._expect(speaker, upcoming)
+                    speaker, upcoming = source, self._expected.get(source)
+                    system, component = source & 255, source >> 8
+                upcoming = NEXT[sequence] if sequence == upcoming else self._gap(upcoming, sequence)
                 if flags:
                     if flags != SIGNED:
                         self.counters.incompatible += 1
                         continue
                     self.counters.signed += 1
                 good += 1
-                if magic == V1:
-                    old += 1
-                if entry[2]:
-                    payload = data[end - length : end]
-                    raw = data[before : i - stamped] if keep_all or flags else b""
+                if message_id is not None:
+                    if reader is None:
+                        message = None
+                    else:
+                        kind, whole, fields = reader
+                        if length >= whole:
+                            message = new(kind, fields(data, end - length))
+                        else:
+                            message = new(kind, fields(data[end - length : end].ljust(whole, b"\0")))
+                    raw = data[before : i - stamped] if flags or self._keep_all else b""
                     stamp = STAMP(data, before - stamped)[0] if stamped else 0
-                    version = 1 if magic == V1 else 2
-                    frames.append(new(Frame, (entry[1], source[0], source[1], sequence, payload, raw, version, stamp)))
+                    frames.append(new(Frame, (message_id, system, component, sequence, message, raw, stamp)))
         except struct.error:
             pass  # the data ends within a header
+        self._speaker, self._upcoming = speaker, upcoming
         self._tail = data[i - stamped :]
         if stamped and before >= 0:
             (self.last_stamp,) = STAMP(data, before - stamped)
         self.counters.frames += good
-        self.counters.frames_v1 += old
+        self.counters.frames_v1 += old + good - since if version == V1 else old
         return frames
 
-    def _gap(self, source: bytes, sequence: int) -> None:
-        """Count the frames missing before this one; the first frame of a source only starts its count."""
-        expected = self._expected.get(source)
-        if expected is None:
-            if len(self._expected) >= MAX_SOURCES:
-                return
-        else:
+    def _expect(self, source: int, sequence: int | None) -> None:
+        """Remember the sequence number of a source's next frame while others speak."""
+        if sequence is not None and (source in self._expected or len(self._expected) < MAX_SOURCES):
+            self._expected[source] = sequence
+
+    def _gap(self, expected: int | None, sequence: int) -> int:
+        """Count the frames missing before this one; the first frame of a source only starts its count.
+
+        Gives the sequence number of the next one.
+        """
+        if expected is not None:
             gap = (sequence - expected) & 255
             if gap >= LATE:
-                return
+                return expected
             self.counters.lost += gap
-        self._expected[source] = (sequence + 1) & 255
+        return NEXT[sequence]
 
     def _doubt(self, data: bytes, mirrored: bytes, i: int, following: int) -> int:
         """Where to go on from a whole frame whose CRC is bad or cannot be checked; `i` itself: wait for more data.
@@ -257,9 +321,9 @@ class Parser:
         """
         if data[i] == V2:
             message_id, sequence = int.from_bytes(data[i + 7 : i + 10], "little"), data[i + 4]
-            source = data[i + 5 : i + 7]
+            source = data[i + 5] | data[i + 6] << 8
         else:
-            message_id, sequence, source = data[i + 5], data[i + 2], data[i + 3 : i + 5]
+            message_id, sequence, source = data[i + 5], data[i + 2], data[i + 3] | data[i + 4] << 8
         bad = message_id in CRC_EXTRA
         at_end = following >= len(data)
         inside, open_inside = self._find(data, mirrored, i + 1, following) if bad or at_end else (-1, -1)
@@ -273,7 +337,7 @@ class Parser:
             count(self.counters.bad_crc if bad else self.counters.unknown, message_id)
             # its header may be wrong: believed only if it fits, for it must not add to the lost frames
             if self._expected.get(source) == sequence:
-                self._expected[source] = (sequence + 1) & 255
+                self._expected[source] = NEXT[sequence]
             return following
         if bad:
             count(self.counters.bad_crc, message_id)
@@ -301,22 +365,22 @@ class Parser:
     def _judge(self, data: bytes, mirrored: bytes, i: int) -> int:
         """VALID: a whole frame of a known id with a good CRC. OPEN: the data ends before that is certain."""
         size = len(data)
-        header = 10 if data[i] == V2 else 6
+        _, _, header, seed = FORMATS[data[i]]
         if i + header > size:
             return OPEN
-        entry = self._lookup(data[i + 7 : i + 10] if header == 10 else data[i + 5])
-        if entry is None:
+        effect, _, _ = self._known[data[i + 7 : i + 10] if header == 10 else data[i + 5]]
+        if effect < 0:
             return WRONG
         end = i + header + data[i + 1]
         if end + (15 if header == 10 and data[i + 2] & SIGNED else 2) > size:
             return OPEN
-        crc = crc_hqx(mirrored[i + 1 : end], 0xFFFF) ^ entry[0]
+        crc = crc_hqx(mirrored[i:end], seed) ^ effect
         return VALID if crc == BACK[mirrored[end + 1]] ^ mirrored[end] else WRONG
 
 
-def _unchecked(data: bytes, i: int, start: int, end: int, following: int) -> Frame:
+def _unchecked(data: bytes, i: int, following: int) -> Frame:
     """A frame of an unknown id, as its header says it is."""
     raw = data[i:following]
     if raw[0] == V2:
-        return Frame(int.from_bytes(raw[7:10], "little"), raw[5], raw[6], raw[4], data[start:end], raw, 2)
-    return Frame(raw[5], raw[3], raw[4], raw[2], data[start:end], raw, 1)
+        return Frame(int.from_bytes(raw[7:10], "little"), raw[5], raw[6], raw[4], None, raw)
+    return Frame(raw[5], raw[3], raw[4], raw[2], None, raw)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from .definitions import CRC_EXTRA
 from .encode import with_crc
-from .framing import MIRROR, SIGNED, V2
+from .framing import MIRROR, SIGNED, V1, V2
 
 if TYPE_CHECKING:
     from .framing import Frame
@@ -78,7 +78,7 @@ def stamp_at(unix_us: int) -> int:
 
 def is_signed(frame: Frame) -> bool:
     """Whether a frame carries a signature, good or bad. MAVLink 1 has none."""
-    return frame.version == 2 and len(frame.raw) >= SHORTEST and frame.raw[2] & SIGNED != 0
+    return len(frame.raw) >= SHORTEST and frame.raw[0] != V1 and frame.raw[2] & SIGNED != 0
 
 
 class Signer:

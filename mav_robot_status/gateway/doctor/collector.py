@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final
 from ...hardware.fields.view import named
 from ...hardware.identity import is_autopilot
 from ...mavlink import definitions as mav
-from ...mavlink.decode import decode
-from ...mavlink.framing import Counters, Parser
+from ...mavlink.framing import V1, Counters, Parser
 from ...mavlink.framing import count as add
 from ..paths import APART, CLOCKS
 from .findings import HEARTBEAT, Speaker
@@ -126,15 +125,14 @@ class _Voice:
 
     def take(self, frame: Frame, now: Instant) -> None:
         self.frames += 1
-        self.v1 += frame.version == 1
+        self.v1 += frame.raw[0] == V1
         number, first, _ = self._times.get(frame.message_id, (0, now.mono, 0.0))
         self._times[frame.message_id] = number + 1, first, now.mono
         if frame.message_id == HEARTBEAT:
-            self._beat(decode(frame), frame.component)
+            self._beat(frame.message, frame.component)
         elif frame.message_id in CLOCKS:
-            message = decode(frame)
-            if (boot_ms := getattr(message, "time_boot_ms", None)) is not None:
-                self._clock(now.mono - boot_ms / 1000)
+            message = frame.message
+            self._clock(now.mono - message.time_boot_ms / 1000)
             if type(message) is mav.SystemTime and message.time_unix_usec > YEAR_2020_US:
                 self._clock_off = (message.time_unix_usec - now.unix_us) / 1e6
 

@@ -157,10 +157,10 @@ class _Whole(Recording):
     def overheard(self, collector: Collector) -> Iterator[Stamped]:
         """What the gateway wants of it; the collector hears all."""
         for stamped in self:
-            frame = stamped.what
+            now, frame, new_segment = stamped
             if frame is not None:
-                collector.take(frame, stamped.now)
-            yield stamped if frame is None or frame.message_id in WANTED_IDS else stamped._replace(what=None)
+                collector.take(frame, now)
+            yield stamped if frame is None or frame.message_id in WANTED_IDS else (now, None, new_segment)
 
 
 def _read(config: Config, base: Findings) -> Findings:

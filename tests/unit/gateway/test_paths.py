@@ -1,22 +1,22 @@
 from __future__ import annotations
 
-import struct
-
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_robot_status.gateway.paths import APART, MOST_WAYS, PROOFS, SILENCE, Paths
-from mav_robot_status.mavlink.framing import Frame
+from mav_robot_status.mavlink import definitions as mav
+from mav_robot_status.mavlink.encode import enclose
+from mav_robot_status.mavlink.framing import Frame, Parser
 
 VEHICLE = (1, 1)
 
 
 def beat(ids: tuple[int, int] = VEHICLE) -> Frame:
-    return Frame(0, *ids, 0, bytes(9), b"", 2)
+    return Frame(0, *ids, 0, mav.Heartbeat(0, 2, 3, 0, 3, 3), b"")
 
 
 def attitude(clock_ms: int) -> Frame:
-    return Frame(30, *VEHICLE, 0, struct.pack("<I", clock_ms), b"", 2)
+    return Frame(30, *VEHICLE, 0, mav.Attitude(clock_ms, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), b"")
 
 
 def heard(paths: Paths[str], frame: Frame, way: str, now: float) -> bool:
@@ -106,7 +106,7 @@ def test_whatever_comes_nothing_raises_and_the_ways_stay_few(frames: list[tuple[
     now = 0.0
     for message_id, payload, way, step in frames:
         now += step
-        frame = Frame(message_id, *VEHICLE, 0, payload, b"", 2)
+        (frame,) = Parser(None).feed(enclose(message_id, payload, system=1, component=1, sequence=0))
         if not heard(paths, frame, str(way), now):
             paths.conflict(frame, str(way))
     assert all(len(path.others) <= MOST_WAYS for path in paths._paths.values())

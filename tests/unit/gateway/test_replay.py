@@ -70,7 +70,7 @@ def test_the_new_segment_knows_nothing_of_the_old_one(tmp_path: Path, stdout: Te
         for stamped in Recording(log_of(tmp_path / "a.tlog", 0, 1, 90_000, 90_001)):
             yield stamped
             (tracked,) = plant.hw.vehicles
-            if stamped.what is not None:
+            if stamped[1] is not None:
                 since.append({(inhibit.since_us - START_US) / 1e6 for inhibit in tracked.handle.detail.inhibits})
 
     run_through(plant, watched())
@@ -97,7 +97,7 @@ def test_an_instant_is_lived_before_the_next_is_asked_for(tmp_path: Path, stdout
             yield stamped
             (tracked,) = plant.hw.vehicles
             link = tracked.handle.detail.link.value
-            told.append((stamped.now.mono, stamped.what is None, link, tracked.handle.heard_at))
+            told.append((stamped[0].mono, stamped[1] is None, link, tracked.handle.heard_at))
 
     last = run_through(plant, watched())
     assert told == [(0.0, False, "CONNECTED", 0.0), (10.0, False, "CONNECTED", 10.0), (10.0, True, "CONNECTED", 10.0)]

@@ -33,13 +33,11 @@ DEFINITIONS = {definition.type: definition for definition in mav.MESSAGES.values
 Ids = tuple[int, int]
 
 
-def frame_of(message: Any, ids: Ids = (1, 1), version: int = 2) -> Frame:
-    """A message as the parser gives it: MAVLink 2 cuts trailing zeros off."""
+def frame_of(message: Any, ids: Ids = (1, 1)) -> Frame:
+    """A message as the parser gives it: in the precision of the wire."""
     definition = DEFINITIONS[type(message)]
-    payload: bytes = definition.layout.pack(*message)
-    if version == 2:
-        payload = payload.rstrip(b"\0") or b"\0"
-    return Frame(definition.id, *ids, 0, payload, raw=b"", version=version)
+    layout = definition.layout
+    return Frame(definition.id, *ids, 0, type(message)(*layout.unpack(layout.pack(*message))), raw=b"")
 
 
 def statustext(text: str | bytes, severity: int, number: int = 0, chunk: int = 0) -> mav.Statustext:

@@ -10,6 +10,8 @@ from mav_robot_status.hardware.robot_hw import MOST_VEHICLES, MavlinkRobotHW
 from mav_robot_status.hardware.tracked import Slot
 from mav_robot_status.interface import LinkState, RobotStatus, TriState
 from mav_robot_status.mavlink import definitions as mav
+from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.framing import Parser
 from mav_robot_status.testing import ManualClock
 
 from .driver import Flight, copter, frame_of, px4
@@ -181,6 +183,7 @@ def test_a_vehicle_that_nobody_expects_any_more_is_not_taken_over() -> None:
 
 def test_a_frame_of_mavlink_1_is_heard_like_one_of_mavlink_2() -> None:
     flight = px4(streams=False)
-    flight.hw.take(frame_of(BEAT, version=1), flight.clock.now())
+    (frame,) = Parser({0}).feed(encode(BEAT, system=1, component=1, sequence=0, version=1))
+    flight.hw.take(frame, flight.clock.now())
     flight.look()
     assert flight.status.drives_powered is TriState.TRUE

@@ -21,7 +21,7 @@ class Record(NamedTuple):
 def records(stamps: list[int], counts: Counts) -> list[Stamped]:
     """When each stamp was heard, with nothing behind the last one."""
     found = list(itertools.islice(timed(map(Record, stamps), lambda: END, counts), len(stamps)))
-    assert [it.what.stamp for it in found] == stamps
+    assert [what.stamp for _, what, _ in found] == stamps
     return found
 
 
@@ -96,11 +96,11 @@ def test_a_first_stamp_that_is_wrong_is_left_behind_at_the_second() -> None:
 def test_time_never_runs_backward_whatever_the_stamps(stamps: list[int]) -> None:
     counts = Counts()
     found = records(stamps, counts)
-    monos = [r.now.mono for r in found]
+    monos = [now.mono for now, _, _ in found]
     assert monos == sorted(monos)
-    assert sum(r.new_segment for r in found) == counts.jumps
-    for before, after in itertools.pairwise(found):
-        assert after.new_segment or after.now.unix_us >= before.now.unix_us
+    assert sum(new_segment for _, _, new_segment in found) == counts.jumps
+    for (before, _, _), (after, _, new_segment) in itertools.pairwise(found):
+        assert new_segment or after.unix_us >= before.unix_us
 
 
 def test_neighbours_are_five_seconds_back_to_a_day_forward() -> None:

@@ -62,7 +62,7 @@ def write(path: Path, *numbers: int) -> None:
 
 
 def numbers(path: Path) -> list[int]:
-    return [int.from_bytes(it.what.payload[:4], "little") for it in Recording(str(path)) if it.what is not None]
+    return [frame.message.custom_mode for _, frame, _ in Recording(str(path)) if frame is not None]
 
 
 def frames_of(path: Path) -> list[Frame]:
@@ -128,9 +128,9 @@ def test_what_is_written_is_read_by_our_own_reader(flight: Path) -> None:
     for number in range(300):
         writer.write(START + number, frame(number, 1 + number % 2))
     writer.close()
-    found = [it for it in Recording(str(flight)) if it.what is not None]
-    assert [it.now.unix_us - START for it in found] == list(range(300))
-    assert [it.what.payload[:2] for it in found] == [n.to_bytes(2, "little") for n in range(300)]
+    found = [(now, frame) for now, frame, _ in Recording(str(flight)) if frame is not None]
+    assert [now.unix_us - START for now, _ in found] == list(range(300))
+    assert [frame.message.custom_mode for _, frame in found] == list(range(300))
 
 
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
@@ -411,7 +411,7 @@ def test_a_disk_that_stalls_is_not_felt_and_what_it_costs_is_counted(flight: Pat
     assert lines.get_nowait() == f"{flight}: {dropped} frames are not in it"
     assert lines.empty()
     content += flight.read_bytes()
-    found = [int.from_bytes(it.payload[:4], "little") for it in Parser(None, stamped=True).feed(content)]
+    found = [it.message.custom_mode for it in Parser(None, stamped=True).feed(content)]
     assert len(found) * size == len(content)
     assert len(found) == total + 1 - dropped
     assert found == sorted(set(found))
@@ -555,7 +555,7 @@ def test_a_killed_process_loses_a_second_and_tears_one_record_at_most(flight: Pa
         process.wait(TIME_OUT)
     before = flight.read_bytes()
     recording = Recording(str(flight))
-    found = [int.from_bytes(it.what.payload[:4], "little") for it in recording if it.what is not None]
+    found = [frame.message.custom_mode for _, frame, _ in recording if frame is not None]
     assert found[:1000] == list(range(1000))
     assert found == sorted(set(found))
     torn = len(before) % len(stamped(0))

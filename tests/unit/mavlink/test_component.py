@@ -28,8 +28,8 @@ def test_our_heartbeat_is_a_companions_and_mirrors_the_error() -> None:
     component = Component()
     calm, alarmed = parsed(component.heartbeat(7)), parsed(component.heartbeat(7, in_error=True))
     assert (calm.system, calm.component, calm.sequence, alarmed.sequence) == (7, 192, 0, 1)
-    assert (calm.payload[4], calm.payload[5], calm.payload[7]) == (18, 8, 4)
-    assert alarmed.payload[7] == 5
+    assert calm.message == Heartbeat(0, 18, 8, 0, 4, 3)
+    assert alarmed.message == Heartbeat(0, 18, 8, 0, 5, 3)
 
 
 def test_a_system_of_our_own_may_be_configured() -> None:

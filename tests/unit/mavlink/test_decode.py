@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from mav_robot_status.mavlink import pymavlink_dialect
-from mav_robot_status.mavlink.decode import decode, text
+from mav_robot_status.mavlink.decode import text
 from mav_robot_status.mavlink.definitions import MESSAGES, Definition
-from mav_robot_status.mavlink.encode import encode
-from mav_robot_status.mavlink.framing import Frame, Parser
+from mav_robot_status.mavlink.encode import enclose, encode
+from mav_robot_status.mavlink.framing import Parser
 
 CODES = {"uint8_t": "B", "uint16_t": "H", "int32_t": "i", "float": "f"}
 
@@ -27,6 +27,12 @@ def raw(message: Any, name: str, size: int) -> bytes:
     return bytes(value).ljust(size, b"\0")
 
 
+def decoded(message_id: int, payload: bytes, version: int = 2) -> Any:
+    data = enclose(message_id, payload, system=1, component=1, sequence=0, version=version)
+    (frame,) = Parser({message_id}).feed(data)
+    return frame.message
+
+
 @pytest.mark.parametrize("definition", MESSAGES.values(), ids=lambda d: d.name)
 def test_every_message_decodes_as_pymavlink_decodes_it_trimmed_or_not(definition: Definition) -> None:
     rng = random.Random(definition.id)
@@ -35,7 +41,7 @@ def test_every_message_decodes_as_pymavlink_decodes_it_trimmed_or_not(definition
             definition.layout.size, b"\0"
         )
         data = encode(definition.type._make(definition.layout.unpack(body)), system=1, component=1, sequence=0)
-        ours = decode(Parser(MESSAGES).feed(data)[0])
+        ours = Parser(MESSAGES).feed(data)[0].message
         theirs = pymavlink_dialect.MAVLink(None).parse_char(data)
         assert theirs
         assert type(ours) is definition.type
@@ -49,17 +55,15 @@ def test_every_message_decodes_as_pymavlink_decodes_it_trimmed_or_not(definition
 
 
 def test_bytes_beyond_the_layout_are_ignored() -> None:
-    frame = Frame(245, 1, 1, 0, b"\x01\x02of a newer definition", b"", 2)
-    assert decode(frame) == MESSAGES[245].type(vtol_state=1, landed_state=2)
+    assert decoded(245, b"\x01\x02of a newer definition") == MESSAGES[245].type(vtol_state=1, landed_state=2)
 
 
 def test_a_short_mavlink_1_payload_without_extensions_is_filled_up() -> None:
-    frame = Frame(77, 1, 1, 0, b"\x90\x01\x04", b"", 1)
-    assert decode(frame) == MESSAGES[77].type(400, 4, 0, 0, 0, 0)
+    assert decoded(77, b"\x90\x01\x04", version=1) == MESSAGES[77].type(400, 4, 0, 0, 0, 0)
 
 
 def test_a_message_that_is_not_used_is_none() -> None:
-    assert decode(Frame(46, 1, 1, 0, bytes(2), b"", 2)) is None
+    assert decoded(46, bytes(2)) is None
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import pytest
 
 from mav_robot_status.mavlink import pymavlink_dialect
-from mav_robot_status.mavlink.decode import decode
 from mav_robot_status.mavlink.definitions import (
     MESSAGES,
     AvailableModesMonitor,
@@ -51,9 +50,9 @@ def test_golden_frames_are_written_and_read(message: Any, header: tuple[int, int
     system, component, sequence, version = header
     data = bytes.fromhex(wire)
     assert encode(message, system=system, component=component, sequence=sequence, version=version) == data
-    (frame,) = Parser(MESSAGES).feed(data)
-    assert (frame.system, frame.component, frame.sequence, frame.version) == header
-    assert decode(frame) == message
+    (frame,) = Parser(None).feed(data)
+    assert (frame.system, frame.component, frame.sequence) == header[:3]
+    assert (frame.message, frame.raw) == (message, data)
 
 
 @EVERY_MESSAGE

@@ -3,28 +3,39 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import logging
+import os
 import signal
 import sys
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from . import __version__
 from .commands import COMMANDS, PROGRAM, command
-from .errors import MavRobotStatusError
+from .errors import MavRobotStatusError, UsageError
 from .streams import StderrHandler, complain, detach, open_missing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+class _Arguments(argparse.ArgumentParser):
+    """Tells a fault in one line, where argparse would print all options before it."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raises UsageError."""
+        raise UsageError(f"{message}; see {self.prog} --help")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """The command. 0 done; 1 a link or output failed for good; 2 usage, configuration, missing log file."""
     open_missing()
     arguments = list(sys.argv[1:] if argv is None else argv)
-    if not arguments or arguments[0] not in (*COMMANDS, "-h", "--help", "--version"):
-        arguments.insert(0, "run")
     try:
+        if not arguments or arguments[0] not in (*COMMANDS, "-h", "--help", "--version"):
+            _doubt_command(arguments[:1])
+            arguments.insert(0, "run")
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, signal.default_int_handler)  # until the gateway has a handler of its own
         return _run(arguments)
@@ -36,6 +47,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     except KeyboardInterrupt:
         return 0
+
+
+def _doubt_command(first: Sequence[str]) -> None:
+    """Raise UsageError where a connection is expected, and what stands there is nearly the name of a command."""
+    for word in first:
+        near = difflib.get_close_matches(word, COMMANDS, 1, 0.75)
+        if near and not os.path.exists(word):
+            raise UsageError(f"there is no command '{word}'; did you mean '{near[0]}'?")
 
 
 def _run(arguments: list[str]) -> int:
@@ -50,7 +69,7 @@ def _run(arguments: list[str]) -> int:
 
 def _parser(asked: str) -> argparse.ArgumentParser:
     """Every command has its line in the help, and the one that is asked for has its arguments."""
-    parser = argparse.ArgumentParser(
+    parser = _Arguments(
         prog=PROGRAM,
         description="RobotStatus of MAVLink vehicles: can it move, who is in charge, and if it cannot move, why? "
         "The status informs; it is no safety function.",

@@ -57,12 +57,15 @@ def run_through(plant: Plant, recording: Iterable[Stamped]) -> Instant:
     hw = plant.hw
     take = hw.take
     last = NEVER
-    due = math.inf
+    due = -math.inf  # the first record is where it begins
     for now, frame, new_segment in recording:
         mono = now.mono
         if new_segment:
             plant.forget(last)
         elif due < mono or hw.deadline < mono:
+            if last is NEVER:
+                plant.tick(now)  # vehicles that are expected have lines before they are heard
+                last = now
             due = plant.next_due(last.mono, mono)
             if due < mono:
                 live_through(plant, last, now)

@@ -294,7 +294,10 @@ class Switchboard:
         for station in self.stations:
             if not station.is_out:
                 got = station.totals()
-                heard = f"{got.frames} MAVLink frames" if got.frames else "nothing that is MAVLink"
+                rest = (
+                    f"{got.garbage_bytes} bytes of something else" if got.garbage_bytes else "nothing that is MAVLink"
+                )
+                heard = f"{got.frames} MAVLink frames" if got.frames else rest
                 log.warning("no autopilot heard yet, %s: %s so far", station.link.text, heard)
         trust = self.voice.trust
         if trust is not None and (found := trust.summary()):

@@ -1,7 +1,8 @@
 """e_stopped: what shows an emergency stop, by autopilot, and what shows that there is none.
 
 On ArduPilot an e-stop by RC switch or command changes neither HEARTBEAT nor, while armed, SYS_STATUS: an armed vehicle
-of which nothing more is heard is UNKNOWN. PX4 shows every stop as state FLIGHT_TERMINATION.
+of which nothing more is heard is UNKNOWN. PX4 shows every stop as state FLIGHT_TERMINATION; before 1.12 it did not, and
+only said so.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from .identity import ARDUPILOT, Family, Stack
 from .sensors import is_ready, safety_switch_on
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from ..clock import Instant
     from ..mavlink.definitions import SysStatus
     from .pulse import Pulse
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
 HONOURED_BY: Final = frozenset({Family.COPTER, Family.PLANE, Family.ROVER})
 """The ArduPilot vehicles whose motors an e-stop by switch or command stops. ArduSub 4.5.6 was recorded accepting the
 command and driving on, and the others were never seen with one."""
+ARM_EMERGENCY_STOP: Final = 165
+"""RCn_OPTION of a switch that stops in its low position, where it is parked: the pre-arm checks excuse that stop."""
 SETTLING: Final = 2.0
 """Seconds after a disarm, a connection or a word on the stop before a healthy PREARM_CHECK bit says anything: it is
 recomputed once a second, and forced healthy while armed."""
@@ -58,7 +63,7 @@ def said(stop: Stop, engaged: bool, text: str | None, now: Instant, source: str 
         source=source or f"STATUSTEXT: {text}",
         since=stop.since if stop.said is value else now,
         last=now.mono,
-        repeats=engaged and text is not None and "MotorEStop" not in text,
+        repeats=engaged and text is not None and "Emergency Stopped" in text,
         ready=0 if engaged else stop.ready,
         ready_at=stop.ready_at,
     )
@@ -78,6 +83,11 @@ def heard_sys_status(stop: Stop, status: SysStatus, pulse: Pulse, stack: Stack, 
     if ready >= READY_MESSAGES:
         return Stop(ready=ready, ready_at=now)
     return stop._replace(ready=ready, ready_at=now)
+
+
+def is_excused(switches: Mapping[int, int]) -> bool:
+    """Whether the pre-arm checks may pass although the motors are stopped: by `switches`, RCn_OPTION by channel."""
+    return ARM_EMERGENCY_STOP in switches.values()
 
 
 def still_said(stop: Stop, now: float) -> TriState:

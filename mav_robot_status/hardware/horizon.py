@@ -31,9 +31,14 @@ def _of_clock(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     return memory.boots, memory.faults and memory.boot.at
 
 
+def _is_vetoed(memory: Memory) -> bool:
+    watch, speed = memory.watch, driving_speed(memory)
+    return outputs.is_vetoed(watch, memory.family, memory.vehicle_type, speed, memory.turning)
+
+
 def _of_attitude(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
-    seen = memory.observation.attitude
-    return seen and seen.since, memory.faults and memory.boot.at
+    seen, held = memory.observation.attitude, memory.watch.held_since is not None
+    return seen and seen.since, memory.faults and memory.boot.at, held and _is_vetoed(memory)
 
 
 def _of_global_position(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
@@ -65,13 +70,13 @@ def _of_local_position(memory: Memory, options: HardwareOptions) -> tuple[object
 
 
 def _of_vfr_hud(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
-    moving, seen, watch = memory.motion, memory.observation.vfr_hud, memory.watch
+    moving, seen = memory.motion, memory.observation.vfr_hud
     return (
         seen and seen.since,
         moving.value,
         moving.value is UNKNOWN and moving.slow_since is None,
         moving.speed is None,
-        watch.held_since is not None and outputs.is_vetoed(watch, memory.family, driving_speed(memory)),
+        memory.watch.held_since is not None and _is_vetoed(memory),
     )
 
 
@@ -87,6 +92,7 @@ def _of_outputs(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
         watch.held_since,
         memory.observation.esc and outputs.is_at_stop(watch, memory.vehicle_type),
         memory.stop.said,  # ended by a motor that is driven
+        memory.switches,
     )
 
 
@@ -120,6 +126,11 @@ def _of_landed_state(memory: Memory, options: HardwareOptions) -> tuple[object, 
     return seen and seen.since, seen and seen.message
 
 
+def _of_estimator(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
+    """It is looked at with the next speed."""
+    return ()
+
+
 def _of_current_mode(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
     seen = memory.observation.current_mode
     return seen and seen.since, seen and seen.message
@@ -148,6 +159,7 @@ def _of_the_rest(memory: Memory, options: HardwareOptions) -> tuple[object, ...]
 PARTS: Final[Mapping[type, Part]] = {
     mav.Attitude: _of_attitude,
     mav.CurrentMode: _of_current_mode,
+    mav.EkfStatusReport: _of_estimator,
     mav.EscStatus: _of_esc,
     mav.EscTelemetry1To4: _of_esc,
     mav.EscTelemetry5To8: _of_esc,

@@ -48,7 +48,7 @@ class Family(Enum):
 
 
 # Names of their own, for what runs many times a second: Python 3.11 takes long to find a member in its enumeration.
-ARDUPILOT, PX4, INAV = Stack.ARDUPILOT, Stack.PX4, Stack.INAV
+ARDUPILOT, PX4, INAV, OTHER = Stack.ARDUPILOT, Stack.PX4, Stack.INAV, Stack.OTHER
 PLANE, ROVER = Family.PLANE, Family.ROVER
 
 FAMILIES: Final[dict[int, Family]] = {

@@ -6,6 +6,7 @@ changes; what it is made of, but for the observation, are values.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
@@ -49,9 +50,15 @@ class Memory:
     motion: Motion = field(default_factory=Motion)
     gps_motion: Motion = field(default_factory=Motion)
     """What the receiver's own ground speed says; only used while the autopilot has no estimate."""
+    unaided: bool = False
+    """Whether ArduPilot's estimator has said that nothing measures where it is."""
+    unaided_at: float = -math.inf
+    """When it said so, or the contrary."""
     turning: float = 0.0
     """The rotation that the latest ATTITUDE tells, rad/s."""
     watch: outputs.Watch = field(default_factory=outputs.Watch)
+    switches: Mapping[int, int] = field(default_factory=dict)
+    """RCn_OPTION by channel, as far as heard."""
     texts: statustext.Assembly = statustext.EMPTY
     modes: Mapping[int, AvailableMode] = field(default_factory=dict)
     not_ready: Said | None = None

@@ -26,6 +26,7 @@ DEMAND: Final = 15  # %: VFR_HUD.throttle from which an output at stop is suspic
 HOLD: Final = 1.0  # s
 BEATS_APART: Final = 3.5  # s: a stop value counts only from between two disarmed heartbeats this near
 GROWTH: Final = 0.5  # m/s: a speed that has grown this much while held says that something drives
+STRAIGHT: Final = 0.15  # rad/s: a rover that turns faster may be driven by a channel that is not the assumed one
 
 # SERVOn_FUNCTION: 31 heli RSC, 33-40 and 82-85 and 160-179 motors, 70 throttle, 73/74 throttle left and right.
 MOTOR_FUNCTIONS: Final = frozenset({31, *range(33, 41), 70, 73, 74, *range(82, 86), *range(160, 180)})
@@ -108,7 +109,9 @@ def heard_outputs(
     at_stop = complete and bool(known) and max(known) <= AT_STOP
     all_off = complete and len(known) >= SEVERAL and min(known) > OFF_STOP
     demanded = throttle is not None and throttle >= DEMAND
-    watch.proved = watch.proved or (off_stop and demanded) or all_off
+    # one of several assumed channels may move a gimbal; the motors of a multirotor all leave their stop value
+    one_will_do = not (assumed and len(motors) >= SEVERAL)
+    watch.proved = watch.proved or (off_stop and demanded and one_will_do) or all_off
     if not (at_stop and demanded and watch.proved and watch.driven_seen):
         watch.held_since = None
     elif watch.held_since is None:
@@ -142,15 +145,21 @@ def is_at_stop(watch: Watch, vehicle_type: int) -> bool:
     return len(known) == len(motors) > 0 and all(abs(value - stop) <= OFF_STOP for value, stop in known)
 
 
-def is_vetoed(watch: Watch, family: Family, speed: float) -> bool:
+def is_vetoed(watch: Watch, family: Family, vehicle_type: int, speed: float, turning: float) -> bool:
     """Whether `speed` (`hearing.movement.driving_speed`) says that something drives though the outputs are held.
 
-    A copter that is stopped falls, whatever it did before; a rover coasts.
+    A copter that is stopped falls, whatever it did before; a rover coasts. `turning` in rad/s: a rover with a motor on
+    each side stands still with one of them while it turns.
     """
-    return speed - (watch.speed_then if family is ROVER else 0.0) > GROWTH
+    if family is not ROVER:
+        return speed > GROWTH
+    assumed = channels(watch, vehicle_type)[1]
+    return (assumed and turning > STRAIGHT) or speed - watch.speed_then > GROWTH
 
 
-def verdict(watch: Watch, family: Family, vehicle_type: int, speed: float, now: float) -> TriState:
+def verdict(
+    watch: Watch, family: Family, vehicle_type: int, speed: float, now: float, turning: float = 0.0
+) -> TriState:
     """TRUE held, FALSE driven, UNKNOWN neither (or not for long enough) at `now`."""
     if watch.driven:
         return TriState.FALSE
@@ -158,6 +167,6 @@ def verdict(watch: Watch, family: Family, vehicle_type: int, speed: float, now: 
         return TriState.UNKNOWN
     if family not in HELD_FAMILIES or vehicle_type == HELICOPTER:
         return TriState.UNKNOWN
-    if is_vetoed(watch, family, speed):
+    if is_vetoed(watch, family, vehicle_type, speed, turning):
         return TriState.UNKNOWN
     return TriState.TRUE

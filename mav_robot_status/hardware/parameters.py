@@ -1,4 +1,4 @@
-"""Reading the few parameters that say which outputs drive motors: SERVOn_FUNCTION, politely.
+"""Reading, politely, which outputs drive motors and what the RC switches do: SERVOn_FUNCTION and RCn_OPTION.
 
 Each is asked for once, and once more if it did not come; the answers are kept for as long as the gateway runs. A value
 that somebody else reads is as good as one that we asked for. MAVLink parameter protocol: PARAM_REQUEST_READ by name.
@@ -11,7 +11,8 @@ from typing import Final
 
 from ..mavlink import definitions as mav
 
-NAMES: Final = tuple(f"SERVO{n}_FUNCTION" for n in range(1, 17))
+# the first four RC channels are the sticks
+NAMES: Final = (*(f"SERVO{n}_FUNCTION" for n in range(1, 17)), *(f"RC{n}_OPTION" for n in range(5, 17)))
 FIRST: Final = 5.0  # s after the first heartbeat: streams are asked for before
 APART: Final = 0.4  # s between two requests, so that the answers stay below 100 bytes a second
 PATIENCE: Final = 5.0  # s after the last request until the second round

@@ -123,6 +123,8 @@ def _explain(text: str, scheme: str | None) -> NoReturn:
         raise UsageError(f"{text!r}: there is no {scheme}: connection; did you mean {near[0]}: ?")
     if _ADDRESS.fullmatch(text):
         raise UsageError(f"{text!r} has no port; write {text}:14550 to send there, or udp:{text}:14550 to listen")
+    if os.path.isdir(text):
+        raise UsageError(f"{text!r} is a folder; write the path of a recorded .tlog or of a serial device")
     if "/" in text and not scheme:
         raise UsageError(f"{text!r}: there is no such file; write the path of a recorded .tlog or of a serial device")
     raise UsageError(f"{text!r} is neither a connection nor a file that exists; write for example {_SOME}")

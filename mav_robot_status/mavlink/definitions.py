@@ -299,6 +299,18 @@ class AvailableModesMonitor(NamedTuple):
     seq: int
 
 
+class EkfStatusReport(NamedTuple):
+    """EKF_STATUS_REPORT, id 193; fields in wire order, arrays as raw bytes."""
+
+    velocity_variance: float
+    pos_horiz_variance: float
+    pos_vert_variance: float
+    compass_variance: float
+    terrain_alt_variance: float
+    flags: int
+    airspeed_variance: float
+
+
 class EscTelemetry1To4(NamedTuple):
     """ESC_TELEMETRY_1_TO_4, id 11030; fields in wire order, arrays as raw bytes."""
 
@@ -383,6 +395,7 @@ MESSAGES: Final[dict[int, Definition]] = {
     435: Definition(435, "AVAILABLE_MODES", Struct("<IIBBB35s"), AvailableModes),
     436: Definition(436, "CURRENT_MODE", Struct("<IIB"), CurrentMode),
     437: Definition(437, "AVAILABLE_MODES_MONITOR", Struct("<B"), AvailableModesMonitor),
+    193: Definition(193, "EKF_STATUS_REPORT", Struct("<fffffHf"), EkfStatusReport),
     11030: Definition(11030, "ESC_TELEMETRY_1_TO_4", Struct("<8s8s8s8s8s4s"), EscTelemetry1To4),
     11031: Definition(11031, "ESC_TELEMETRY_5_TO_8", Struct("<8s8s8s8s8s4s"), EscTelemetry5To8),
     11032: Definition(11032, "ESC_TELEMETRY_9_TO_12", Struct("<8s8s8s8s8s4s"), EscTelemetry9To12),

@@ -386,6 +386,7 @@ MAVLINK_MSG_ID_EVENT = 410
 MAVLINK_MSG_ID_AVAILABLE_MODES = 435
 MAVLINK_MSG_ID_CURRENT_MODE = 436
 MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR = 437
+MAVLINK_MSG_ID_EKF_STATUS_REPORT = 193
 MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4 = 11030
 MAVLINK_MSG_ID_ESC_TELEMETRY_5_TO_8 = 11031
 MAVLINK_MSG_ID_ESC_TELEMETRY_9_TO_12 = 11032
@@ -1563,6 +1564,50 @@ class MAVLink_available_modes_monitor_message(MAVLink_message):
 setattr(MAVLink_available_modes_monitor_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_ekf_status_report_message(MAVLink_message):
+    """
+    EKF Status message including flags and variances.
+    """
+
+    id = MAVLINK_MSG_ID_EKF_STATUS_REPORT
+    msgname = "EKF_STATUS_REPORT"
+    fieldnames = ["flags", "velocity_variance", "pos_horiz_variance", "pos_vert_variance", "compass_variance", "terrain_alt_variance", "airspeed_variance"]
+    ordered_fieldnames = ["velocity_variance", "pos_horiz_variance", "pos_vert_variance", "compass_variance", "terrain_alt_variance", "flags", "airspeed_variance"]
+    fieldtypes = ["uint16_t", "float", "float", "float", "float", "float", "float"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<fffffHf")
+    orders = [5, 0, 1, 2, 3, 4, 6]
+    lengths = [1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 71
+    unpacker = struct.Struct("<fffffHf")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, flags: int, velocity_variance: float, pos_horiz_variance: float, pos_vert_variance: float, compass_variance: float, terrain_alt_variance: float, airspeed_variance: float = 0):
+        MAVLink_message.__init__(self, MAVLink_ekf_status_report_message.id, MAVLink_ekf_status_report_message.msgname)
+        self._fieldnames = MAVLink_ekf_status_report_message.fieldnames
+        self._instance_field = MAVLink_ekf_status_report_message.instance_field
+        self._instance_offset = MAVLink_ekf_status_report_message.instance_offset
+        self.flags = flags
+        self.velocity_variance = velocity_variance
+        self.pos_horiz_variance = pos_horiz_variance
+        self.pos_vert_variance = pos_vert_variance
+        self.compass_variance = compass_variance
+        self.terrain_alt_variance = terrain_alt_variance
+        self.airspeed_variance = airspeed_variance
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.velocity_variance, self.pos_horiz_variance, self.pos_vert_variance, self.compass_variance, self.terrain_alt_variance, self.flags, self.airspeed_variance), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_ekf_status_report_message, "name", mavlink_msg_deprecated_name_property())
+
+
 class MAVLink_esc_telemetry_1_to_4_message(MAVLink_message):
     """
     ESC Telemetry Data for ESCs 1 to 4, matching data sent by BLHeli
@@ -1771,6 +1816,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_AVAILABLE_MODES: MAVLink_available_modes_message,
     MAVLINK_MSG_ID_CURRENT_MODE: MAVLink_current_mode_message,
     MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: MAVLink_available_modes_monitor_message,
+    MAVLINK_MSG_ID_EKF_STATUS_REPORT: MAVLink_ekf_status_report_message,
     MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4: MAVLink_esc_telemetry_1_to_4_message,
     MAVLINK_MSG_ID_ESC_TELEMETRY_5_TO_8: MAVLink_esc_telemetry_5_to_8_message,
     MAVLINK_MSG_ID_ESC_TELEMETRY_9_TO_12: MAVLink_esc_telemetry_9_to_12_message,
@@ -3060,6 +3106,36 @@ class MAVLink(object):
 
         """
         self.send(self.available_modes_monitor_encode(seq), force_mavlink1=force_mavlink1)
+
+    def ekf_status_report_encode(self, flags: int, velocity_variance: float, pos_horiz_variance: float, pos_vert_variance: float, compass_variance: float, terrain_alt_variance: float, airspeed_variance: float = 0) -> MAVLink_ekf_status_report_message:
+        """
+        EKF Status message including flags and variances.
+
+        flags                     : Flags. (type:uint16_t)
+        velocity_variance         : Velocity variance. (type:float)
+        pos_horiz_variance        : Horizontal Position variance. (type:float)
+        pos_vert_variance         : Vertical Position variance. (type:float)
+        compass_variance          : Compass variance. (type:float)
+        terrain_alt_variance        : Terrain Altitude variance. (type:float)
+        airspeed_variance         : Airspeed variance. (type:float)
+
+        """
+        return MAVLink_ekf_status_report_message(flags, velocity_variance, pos_horiz_variance, pos_vert_variance, compass_variance, terrain_alt_variance, airspeed_variance)
+
+    def ekf_status_report_send(self, flags: int, velocity_variance: float, pos_horiz_variance: float, pos_vert_variance: float, compass_variance: float, terrain_alt_variance: float, airspeed_variance: float = 0, force_mavlink1: bool = False) -> None:
+        """
+        EKF Status message including flags and variances.
+
+        flags                     : Flags. (type:uint16_t)
+        velocity_variance         : Velocity variance. (type:float)
+        pos_horiz_variance        : Horizontal Position variance. (type:float)
+        pos_vert_variance         : Vertical Position variance. (type:float)
+        compass_variance          : Compass variance. (type:float)
+        terrain_alt_variance        : Terrain Altitude variance. (type:float)
+        airspeed_variance         : Airspeed variance. (type:float)
+
+        """
+        self.send(self.ekf_status_report_encode(flags, velocity_variance, pos_horiz_variance, pos_vert_variance, compass_variance, terrain_alt_variance, airspeed_variance), force_mavlink1=force_mavlink1)
 
     def esc_telemetry_1_to_4_encode(self, temperature: Sequence[int], voltage: Sequence[int], current: Sequence[int], totalcurrent: Sequence[int], rpm: Sequence[int], count: Sequence[int]) -> MAVLink_esc_telemetry_1_to_4_message:
         """

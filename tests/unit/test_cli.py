@@ -23,10 +23,13 @@ def sigterm() -> Iterator[None]:
 
 
 def test_a_wrong_number_is_2(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["udp:127.0.0.1:0", "--rate", "x"])
-    assert ended.value.code == 2
+    assert main(["udp:127.0.0.1:0", "--rate", "x"]) == 2
     assert "'x' is not a rate" in capsys.readouterr().err
+
+
+def test_a_misspelt_command_is_no_connection(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["docter", "udp:127.0.0.1:0"]) == 2
+    assert capsys.readouterr().err == "mav-robot-status: there is no command 'docter'; did you mean 'doctor'?\n"
 
 
 def test_no_connection_is_one_line_and_2(capsys: pytest.CaptureFixture[str]) -> None:

@@ -28,6 +28,9 @@ def e_stopped(view: View) -> Finding:
 
 def _px4_stop(view: View) -> Finding:
     if view.state != TERMINATED:
+        stop = view.memory.stop
+        if estop.still_said(stop, view.now) is TRUE:
+            return TRUE, Evidence("the autopilot said so", stop.source, stop.last)
         return FALSE, beat(view, "PX4 shows every stop as state FLIGHT_TERMINATION")
     if view.heartbeat.base_mode & HIL:
         return UNKNOWN, beat(view, "in hardware-in-the-loop older PX4 is always in lockdown")
@@ -51,6 +54,10 @@ def _ardupilot_stop(view: View) -> Finding:
     if watched is TRUE:
         return TRUE, why
     if not view.armed and view.status is not None and stop.ready >= estop.READY_MESSAGES:
+        if estop.is_excused(memory.switches):
+            return UNKNOWN, Evidence(
+                "the pre-arm checks pass, but excuse a stop by the switch of option 165", "PARAM_VALUE: RCn_OPTION"
+            )
         return FALSE, Evidence(
             "the pre-arm checks, which include the stop, pass", "SYS_STATUS: PREARM_CHECK", stop.ready_at
         )
@@ -79,7 +86,7 @@ def _watched(view: View) -> Finding:
             return UNKNOWN, Evidence("a motor turns, perhaps without being driven", "ESC telemetry: rpm", turning.at)
     if not fresh:
         return UNKNOWN, Evidence("no fresh SERVO_OUTPUT_RAW")
-    value = outputs.verdict(watch, memory.family, memory.vehicle_type, driving_speed(memory), now)
+    value = outputs.verdict(watch, memory.family, memory.vehicle_type, driving_speed(memory), now, memory.turning)
     motors, assumed = outputs.channels(watch, memory.vehicle_type)
     shown = ", ".join(f"{c}: {watch.values[c - 1]} us" for c in motors if c <= len(watch.values))
     source = f"SERVO_OUTPUT_RAW {shown}{' (assumed motor channels)' if assumed else ''}"

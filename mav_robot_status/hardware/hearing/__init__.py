@@ -30,6 +30,7 @@ HANDLERS: Final[dict[type, Handler]] = {
     mav.VfrHud: movement.vfr_hud,
     mav.GpsRawInt: movement.gps_raw_int,
     mav.Attitude: movement.attitude,
+    mav.EkfStatusReport: movement.ekf_status_report,
     mav.SystemTime: movement.system_time,
     mav.ServoOutputRaw: movement.servo_output_raw,
     mav.ParamValue: movement.param_value,

@@ -13,7 +13,7 @@ from ..identity import PX4
 from ..memory import Memory, begin
 from ..motion import Motion
 from ..observation import Observation, heard
-from ..pulse import armed_before, next_beat
+from ..pulse import TERMINATED, armed_before, next_beat
 from .words import pass_time
 
 if TYPE_CHECKING:
@@ -54,6 +54,8 @@ def heartbeat(memory: Memory, message: Heartbeat, now: Instant, options: Hardwar
         memory.assumed_free = False
     if pulse.armed and not before.armed:
         _armed(memory, last, now)
+    if memory.stack is PX4 and message.system_status == TERMINATED:
+        memory.stop = estop.NOTHING  # it shows its stops, and need not be believed on its word
     if pulse.calm_since == now.mono:
         memory.failsafe = None
 
@@ -91,6 +93,7 @@ def rebooted(memory: Memory, boot: boot_rules.Boot, now: Instant) -> None:
         autopilot=memory.autopilot,
         impostor=memory.impostor,
         watch=outputs.Watch(functions=memory.watch.functions),
+        switches=memory.switches,
         modes=memory.modes,
         asked=memory.asked,
         boots=memory.boots + 1,
@@ -114,7 +117,8 @@ def _armed(memory: Memory, previous_beat: float, now: Instant) -> None:
         if causes.CAUSES[code].clears is not causes.Clears.ARMING or latch.last > previous_beat
     }
     stop = memory.stop
-    free = stop.ready >= estop.READY_MESSAGES or estop.still_said(stop, now.mono) is TriState.FALSE
+    checked = stop.ready >= estop.READY_MESSAGES and not estop.is_excused(memory.switches)
+    free = checked or estop.still_said(stop, now.mono) is TriState.FALSE
     new = stop.said is TriState.TRUE and stop.last > previous_beat and not stop.repeats
     memory.stop = stop._replace(ready=0) if new else estop.NOTHING
     memory.not_ready = None

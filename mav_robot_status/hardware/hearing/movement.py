@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from struct import unpack
 from typing import TYPE_CHECKING, Any, Final
 
 from ...mavlink import definitions as mav
 from .. import estop, motion, outputs, sensors
 from ..boot import heard_clock
-from ..identity import ARDUPILOT, INAV, ROVER, SURFACE_BOAT
+from ..identity import AIRCRAFT, ARDUPILOT, INAV, OTHER, PX4, ROVER, SURFACE_BOAT
 from ..observation import Heard, heard, is_fresh
 from .beats import rebooted
 
@@ -19,8 +20,11 @@ if TYPE_CHECKING:
     from ..options import HardwareOptions
 
 
+_NUMBERED: Final = re.compile(rb"SERVO(\d{1,2})_FUNCTION|RC(\d{1,2})_OPTION")
 FIX_3D: Final = 3  # GPS_FIX_TYPE
 NO_SPEED: Final = 0xFFFF  # GPS_RAW_INT.vel
+ESTIMATOR_FRESH: Final = 10.0  # s
+CONST_POS_MODE: Final = 0x80  # EKF_STATUS_FLAGS: nothing measures where it is, and the estimator takes it to stand
 
 
 def extended_sys_state(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:
@@ -38,7 +42,10 @@ def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant
     seen.global_position = heard(message, at, seen.global_position)
     vx, vy, vz = message.vx, message.vy, message.vz
     still = not (vx or vy or vz)
-    speed = _speed(memory, vx / 100, vy / 100, vz / 100, still, message.lat == 0 and message.lon == 0)
+    nowhere = message.lat == 0 and message.lon == 0
+    speed = _speed(memory, vx / 100, vy / 100, vz / 100, still, nowhere)
+    if speed is not None and memory.stack is ARDUPILOT:
+        speed = _measured(memory, speed, vz / 100, nowhere, at, options)
     _moved(memory, memory.motion, speed, at, options)
 
 
@@ -52,6 +59,8 @@ def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, 
     if not is_fresh(seen.global_position, at, motion.FRESH):
         vx, vy, vz = message.vx, message.vy, message.vz
         speed = _speed(memory, vx, vy, vz, not (vx or vy or vz))
+        if speed is not None and memory.stack is ARDUPILOT:
+            speed = _measured(memory, speed, vz, False, at, options)
         _moved(memory, memory.motion, speed, at, options)
 
 
@@ -64,6 +73,14 @@ def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: Hardware
         return
     still = message.groundspeed == 0  # whatever the climb, which comes from the barometer
     speed = _speed(memory, message.groundspeed, 0.0, message.climb, still)
+    if speed is None:
+        pass
+    elif memory.stack is ARDUPILOT:
+        speed = _measured(memory, speed, message.climb, False, at, options)
+    elif memory.stack is PX4:
+        speed = _if_fast(memory, speed, options)  # PX4 keeps the other two back while its estimate is not valid
+    elif memory.stack is OTHER and still and memory.vehicle_type not in AIRCRAFT and _lacks_gps(memory):
+        speed = None  # INAV and Betaflight as themselves
     _moved(memory, memory.motion, speed, at, options)
 
 
@@ -91,6 +108,11 @@ def attitude(memory: Memory, message: mav.Attitude, now: Instant, options: Hardw
         memory.turning = fastest(message.yawspeed, message.rollspeed, message.pitchspeed)
 
 
+def ekf_status_report(memory: Memory, message: mav.EkfStatusReport, now: Instant, options: HardwareOptions) -> None:
+    """EKF_STATUS_REPORT: whether ArduPilot's speed is measured."""
+    memory.unaided, memory.unaided_at = bool(message.flags & CONST_POS_MODE), now.mono
+
+
 def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
     """SYSTEM_TIME: the autopilot's clock."""
     if heard_clock(memory.boot, message.time_boot_ms, now.mono):
@@ -114,6 +136,30 @@ def _speed(memory: Memory, x: float, y: float, z: float, still: bool, nowhere: b
     elif memory.stack is INAV and still and not _has_gps(status):
         return None
     return math.hypot(x, y) if memory.family is ROVER else math.hypot(x, y, z)
+
+
+def _measured(
+    memory: Memory, speed: float, climb: float, nowhere: bool, now: float, options: HardwareOptions
+) -> float | None:
+    """What of ArduPilot's `speed` is measured: without a position it sends nearly zero however fast it goes.
+
+    Then the climb, from the barometer or the water's pressure, is all that can tell, and only of motion.
+    """
+    if now - memory.unaided_at > ESTIMATOR_FRESH:
+        return _if_fast(memory, speed, options) if nowhere else speed
+    if not memory.unaided:
+        return speed
+    return None if memory.family is ROVER else _if_fast(memory, abs(climb), options)
+
+
+def _if_fast(memory: Memory, speed: float, options: HardwareOptions) -> float | None:
+    """`speed` if it tells of motion; None if it would tell of rest."""
+    return speed if speed > (options.v_on if memory.pulse.armed else options.v_on_disarmed) else None
+
+
+def _lacks_gps(memory: Memory) -> bool:
+    status = memory.observation.sys_status
+    return status is not None and not _has_gps(status)
 
 
 def _has_gps(status: Heard | None) -> bool:
@@ -169,15 +215,17 @@ def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, 
 
 
 def param_value(memory: Memory, message: mav.ParamValue, now: Instant, options: HardwareOptions) -> None:
-    """PARAM_VALUE: SERVOn_FUNCTION says which outputs drive motors."""
-    name = message.param_id.split(b"\0")[0]
-    number, value = name[5:-9], message.param_value
-    if not (name.startswith(b"SERVO") and name.endswith(b"_FUNCTION") and number.isdigit() and math.isfinite(value)):
+    """PARAM_VALUE: SERVOn_FUNCTION says which outputs drive motors, RCn_OPTION what the switches do."""
+    found, value = _NUMBERED.fullmatch(message.param_id.split(b"\0")[0]), message.param_value
+    if found is None or not math.isfinite(value) or memory.stack is not ARDUPILOT:
         return
-    channel = int(number)
-    if not 1 <= channel <= 32 or memory.stack is not ARDUPILOT:
+    channel = int(found[1] or found[2])
+    if not 1 <= channel <= 32:
         return
-    memory.watch.name({**memory.watch.functions, channel: int(value)})
+    if found[1]:
+        memory.watch.name({**memory.watch.functions, channel: int(value)})
+    else:
+        memory.switches = {**memory.switches, channel: int(value)}
 
 
 def esc_telemetry(memory: Memory, message: Any, now: Instant, options: HardwareOptions) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from ...mavlink.definitions import Event, Statustext
 from .. import causes, estop, statustext
-from ..identity import PX4, Stack
+from ..identity import ARDUPILOT, PX4, Stack
 from ..memory import Said
 from ..pulse import CRITICAL, TERMINATED
 from ..texts import UNCLASSIFIED, Effect, TextRule, When, classify
@@ -62,12 +62,14 @@ def _said(memory: Memory, text: statustext.Text, now: Instant) -> None:
     elif effect is Effect.CLEAR:
         memory.latches = causes.clear(memory.latches, rule.codes)
     elif effect in (Effect.ESTOP, Effect.RELEASE):
-        if memory.pulse.armed and memory.family not in estop.HONOURED_BY:
+        if memory.stack is ARDUPILOT and memory.pulse.armed and memory.family not in estop.HONOURED_BY:
             return
         engaged = effect is Effect.ESTOP
         memory.stop = estop.said(memory.stop, engaged, words, now)
         memory.assumed_free = False
-        if engaged:
+        if memory.stack is not ARDUPILOT:
+            memory.failsafe = _say(memory.failsafe, words, now)
+        elif engaged:
             memory.not_ready = _say(memory.not_ready, words, now)
     elif effect is Effect.READINESS:
         memory.not_ready = _say(memory.not_ready, words, now)

@@ -15,7 +15,10 @@ RULES: Final = table(
             CLEAR,
             (2002,),
         ),
-        (r"Kill(-switch)? (dis)?engaged|Failsafe activated", DETAIL),
+        # up to 1.11 the words are all there is: no state FLIGHT_TERMINATION
+        (r"(?i)(manual )?kill-switch engaged", Effect.ESTOP),
+        (r"(?i)(manual )?kill-switch disengaged", Effect.RELEASE),
+        (r"Kill (dis)?engaged|Failsafe activated", DETAIL),
         (r"Connection to mission computer lost", CAUSE, (2002,)),
         (r"Connection to ground station lost", CAUSE, (2002,), When.CRITICAL),
         (r"Preflight Fail: (Kill switch engaged|Flight termination active)", DETAIL),
@@ -28,6 +31,9 @@ RULES: Final = table(
             r"Arming denied: |Disarming denied: |Switching to .* is currently not available|Unsupported auto mode",
             READINESS,
         ),
+        # severity 2 in older versions, and no more than a word on what was asked for
+        (r".* not possible|Using minimum takeoff altitude|Already (higher than takeoff altitude|landed)", IGNORE),
+        (r"([Rr]everse )?[Mm]ission finished|offboard mission now running|no valid mission available", IGNORE),
         (r"Low battery", CAUSE, (2003,), When.ARMED),
         (r"Critical battery|Emergency battery level|Dangerously low battery!", CAUSE, (2004,), When.ARMED),
         (r"Battery \d+ disconnected|Battery \d+: .*\. ", CAUSE, (2004,), When.ARMED),

@@ -210,3 +210,16 @@ def test_silence_is_told_after_3_5_s_and_then_every_30_s(stdout: TextIO, caplog:
     told = [r.message for r in caplog.records if "no autopilot heard yet" in r.message]
     assert len(told) == 2
     assert "nothing that is MAVLink" in told[0]
+
+
+def test_bytes_that_are_no_mavlink_are_told_of_while_nothing_is_heard(
+    stdout: TextIO, vehicle: socket.socket, caplog: pytest.LogCaptureFixture
+) -> None:
+    live = Live(Config(links=(HERE,)), stdout)
+    vehicle.sendto(b"NMEA" * 5, address(live))
+    with closing(live):
+        live._told_at = 0.0
+        receive(live, Instant(3.5, 0))
+        live.turn(Instant(3.6, 0))
+    told = [r.message for r in caplog.records if "no autopilot heard yet" in r.message]
+    assert "20 bytes of something else so far" in told[0]

@@ -7,7 +7,7 @@ from typing import Any, TextIO
 
 import pytest
 
-from mav_robot_status.config import Config
+from mav_robot_status.config import Config, VehicleConfig
 from mav_robot_status.errors import UsageError
 from mav_robot_status.gateway.plant import Plant
 from mav_robot_status.gateway.recorded import Recording
@@ -105,6 +105,17 @@ def test_an_instant_is_lived_before_the_next_is_asked_for(tmp_path: Path, stdout
     plant.close(last)
     stdout.seek(0)
     assert any(json.loads(line)["link"]["state"] == "LOST" for line in stdout)
+
+
+def test_a_vehicle_that_is_expected_has_lines_from_the_start_and_also_if_it_is_never_heard(
+    tmp_path: Path, stdout: TextIO
+) -> None:
+    config = Config(vehicles=(VehicleConfig(7, None, "seven"),))
+    replay(config, log_of(tmp_path / "a.tlog", 0, 1, 2), stdout)
+    stdout.seek(0)
+    lines = [json.loads(line) for line in stdout]
+    assert {(line["handle"], line["link"]["state"]) for line in lines} == {("seven", "NEVER_SEEN")}
+    assert len(lines) == pytest.approx(20, abs=2)
 
 
 def test_a_missing_log_is_an_error_for_the_person(tmp_path: Path, stdout: TextIO) -> None:

@@ -5,11 +5,12 @@ import pytest
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.hardware.estop import NOTHING, READY_MESSAGES, Stop, heard_sys_status, said, still_said
 from mav_robot_status.hardware.identity import Stack
+from mav_robot_status.hardware.options import HardwareOptions
 from mav_robot_status.hardware.pulse import Pulse, first_beat
 from mav_robot_status.interface import TriState
-from mav_robot_status.mavlink.definitions import Heartbeat, SysStatus
+from mav_robot_status.mavlink.definitions import Heartbeat, ParamValue, SysStatus
 
-from .driver import FITTED, MOTORS, PREARM, copter
+from .driver import ACTIVE, FITTED, MOTORS, PREARM, STANDBY, TERMINATED, copter, px4
 
 NOW = Instant(1000.0, 1_800_000_000_000_000)
 ALL = FITTED | PREARM
@@ -105,3 +106,39 @@ def test_a_stop_said_between_the_arming_and_its_heartbeat_stays() -> None:
     flight.wait(0.5)
     flight.text(HIGH, 6).hb(armed=True)
     assert flight.status.e_stopped is TriState.TRUE
+
+
+KILL, RELEASED = "Manual kill-switch engaged", "Manual kill-switch disengaged"
+
+
+def test_a_kill_that_an_old_px4_only_speaks_of_is_a_stop_until_it_says_otherwise_or_is_armed() -> None:
+    flight = px4().hb(armed=True, state=ACTIVE).text(KILL, 0)
+    flight.wait(60)
+    assert (flight.status.e_stopped, flight.status.drives_powered) == (TriState.TRUE, TriState.FALSE)
+    assert flight.text(RELEASED, 0).status.e_stopped is TriState.FALSE
+    flight.text(KILL, 0).hb(armed=False, state=STANDBY).wait(2)
+    assert flight.status.e_stopped is TriState.TRUE
+    assert flight.hb(armed=True, state=ACTIVE).status.e_stopped is TriState.FALSE
+
+
+def test_a_px4_that_shows_its_stops_is_believed_on_what_it_shows() -> None:
+    flight = px4().hb(armed=True, state=ACTIVE)
+    flight.wait(1)
+    flight.text(KILL, 0).hb(state=TERMINATED).wait(5)
+    assert flight.status.e_stopped is TriState.TRUE
+    assert [(error.code, error.text) for error in flight.detail.errors] == [(1001, KILL)]
+    assert flight.hb(state=ACTIVE).status.e_stopped is TriState.FALSE  # the word of the release was lost
+
+
+@pytest.mark.parametrize(("option", "expected"), [(165.0, TriState.UNKNOWN), (153.0, TriState.FALSE)])
+def test_checks_that_excuse_the_stop_of_a_parked_switch_do_not_show_that_there_is_none(
+    option: float, expected: TriState
+) -> None:
+    flight = copter(options=HardwareOptions(estop_assume_visible=True))
+    flight.stream("system_time", flight.system_time)
+    flight.send(ParamValue(option, 0, 0, b"RC8_OPTION", 4)).wait(15)
+    assert flight.status.e_stopped is expected
+    flight.reboot().wait(15)
+    assert flight.vehicle.boots == 1
+    assert flight.status.e_stopped is expected
+    assert flight.hb(armed=True, state=ACTIVE).status.e_stopped is expected

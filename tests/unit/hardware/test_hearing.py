@@ -16,6 +16,7 @@ from mav_robot_status.mavlink import definitions as mav
 from .driver import (
     ACTIVE,
     AHRS,
+    ARDUPILOT,
     CRITICAL,
     EMERGENCY,
     FENCE,
@@ -28,6 +29,7 @@ from .driver import (
     PX4,
     ROVER,
     STANDBY,
+    SUB,
     Flight,
     copter,
     px4,
@@ -229,6 +231,55 @@ def test_a_velocity_of_exactly_zero_is_no_estimate_while_the_ahrs_is_unhealthy_o
 def test_a_velocity_of_exactly_zero_is_believed_of_px4() -> None:
     flight = px4().send(mav.ExtendedSysState(0, 1))
     assert moving(flight, lambda: local(flight, 0, 0, 0)) is FALSE
+
+
+AIDED, CONSTANT = 0x33F, 0xA7  # EKF_STATUS_FLAGS as recorded: with GPS, and without any position
+
+
+def estimating(flight: Flight, flags: int) -> Flight:
+    return flight.stream("estimator", lambda: mav.EkfStatusReport(0.0, 0.0, 0.0, 0.0, 0.0, flags, 0.0), hz=2)
+
+
+def test_a_sub_without_a_position_is_not_called_still() -> None:
+    # recorded from a real one: armed, steered for two minutes, and its estimate never above 0.14 m/s
+    for flags, expected in ((AIDED, FALSE), (CONSTANT, UNKNOWN)):
+        flight = estimating(Flight(ARDUPILOT, SUB).hb(armed=True, state=ACTIVE), flags)
+        assert moving(flight, lambda f=flight: here(f, 0.1, 0, 0.02)) is expected
+
+
+def test_without_a_position_only_a_climb_is_motion() -> None:
+    for vehicle_type, expected in ((SUB, TRUE), (ROVER, UNKNOWN)):
+        flight = estimating(Flight(ARDUPILOT, vehicle_type).hb(armed=True, state=ACTIVE), CONSTANT)
+        assert moving(flight, lambda f=flight: here(f, 0.6, 0, -0.4)) is expected
+        assert moving(flight, lambda f=flight: hud(0.6, 0.4)) is expected
+
+
+def test_a_rover_that_loses_its_position_while_it_drives_is_not_called_still() -> None:
+    flight = estimating(rover().hb(armed=True, state=ACTIVE), AIDED)
+    assert moving(flight, lambda: here(flight, 1, 0, 0)) is TRUE
+    estimating(flight, CONSTANT)
+    assert moving(flight, lambda: here(flight, 0.05, 0, 0), 5) is UNKNOWN
+    flight.stop("estimator")
+    assert moving(flight, lambda: here(flight, 0.05, 0, 0), 15) is FALSE
+
+
+def test_a_small_speed_without_a_place_is_no_estimate_unless_the_estimator_says_so() -> None:
+    flight = rover().hb(armed=True, state=ACTIVE)
+    assert moving(flight, lambda: here(flight, 0.05, 0, 0, lat=0)) is UNKNOWN
+    estimating(flight, AIDED & ~0x10)
+    assert moving(flight, lambda: here(flight, 0.05, 0, 0, lat=0)) is FALSE
+
+
+def test_the_ground_speed_of_a_px4_without_a_position_tells_of_motion_alone() -> None:
+    for speed, expected in ((0.05, UNKNOWN), (1.0, TRUE)):
+        flight = Flight(PX4, ROVER).hb(armed=True, state=ACTIVE)
+        assert moving(flight, lambda speed=speed: hud(speed, 0)) is expected
+
+
+def test_a_ground_speed_of_exactly_zero_is_none_of_a_ground_vehicle_that_lists_no_gps() -> None:
+    for bits, expected in ((FITTED & ~GPS, UNKNOWN), (FITTED, FALSE)):
+        flight = Flight(0, ROVER).set(present=bits, enabled=bits, health=bits).hb(armed=True, state=ACTIVE)
+        assert moving(flight, lambda: hud(0, 0)) is expected
 
 
 def test_what_a_disarmed_ardupilot_with_an_unhealthy_ahrs_measures_is_noise() -> None:

@@ -44,8 +44,8 @@ class Machine:
     def fly(self, values: tuple[int, ...] = FLYING) -> Machine:
         return self.beat(True).put(values)
 
-    def judge(self, speed: float = 0.0, after: float = 0.0) -> TriState:
-        return verdict(self.watch, family_of(self.type), self.type, speed, self.now.mono + after)
+    def judge(self, speed: float = 0.0, after: float = 0.0, turning: float = 0.0) -> TriState:
+        return verdict(self.watch, family_of(self.type), self.type, speed, self.now.mono + after, turning)
 
 
 def test_a_motor_off_its_stop_value_is_driven() -> None:
@@ -75,9 +75,17 @@ def test_outputs_that_never_left_their_stop_value_since_arming_are_not_held() ->
 
 
 def test_an_assumed_channel_says_nothing_until_throttle_has_moved_it() -> None:
+    rover = Machine(ROVER).learn((1500, 0, 1500)).beat(True)
+    assert rover.put((1500, 0, 1655), throttle=0).judge() is TriState.UNKNOWN
+    assert rover.put((1500, 0, 1655), throttle=20).judge() is TriState.FALSE
+
+
+def test_one_of_several_assumed_channels_may_be_no_motor() -> None:
+    # motors on the outputs from 9 on, and what is assumed to be a motor drives a gimbal
     one_off = (1632, 1000, 1000, 1000)
-    assert Machine().learn().beat(True).put(one_off, throttle=0).judge() is TriState.UNKNOWN
-    assert Machine().learn().beat(True).put(one_off, throttle=20).judge() is TriState.FALSE
+    machine = Machine().learn().beat(True).put(one_off, throttle=40)
+    assert machine.judge() is TriState.UNKNOWN
+    assert machine.put(STOP, throttle=40).judge(after=9) is TriState.UNKNOWN
     known = Machine(functions={n: 32 + n for n in (1, 2, 3, 4)}).learn().beat(True)
     assert known.put(one_off, throttle=0).judge() is TriState.FALSE
 
@@ -93,6 +101,17 @@ def test_a_speed_that_grows_vetoes() -> None:
     rover = Machine(ROVER).learn((1500, 0, 1500)).fly((1500, 0, 1655)).put((1500, 0, 1500), speed=2.0)
     assert rover.judge(speed=2.2, after=2) is TriState.TRUE
     assert rover.judge(speed=2.6, after=2) is TriState.UNKNOWN
+
+
+def test_a_rover_with_a_motor_on_each_side_is_not_held_while_it_turns_about_one_of_them() -> None:
+    turning = {"speed": 1.0, "after": 2.0, "turning": 0.8}
+    both_sticks_full = ((1500, 0, 1500), (1700, 0, 1700), (2000, 0, 1500))
+    assumed, known = Machine(ROVER), Machine(ROVER, {1: 73, 3: 74})
+    for machine in (assumed, known):
+        stop, straight, round_ = both_sticks_full
+        machine.learn(stop).fly(straight).put(round_, speed=1.0)
+    assert assumed.judge(**turning) is TriState.UNKNOWN
+    assert known.judge(**turning) is TriState.FALSE
 
 
 @pytest.mark.parametrize("vehicle_type", [HELI, PLANE, SUB])

@@ -26,7 +26,7 @@ def test_nothing_is_asked_before_the_streams_were() -> None:
 
 def test_each_parameter_is_asked_for_once_and_apart() -> None:
     parameters = Parameters(1, 2, 100.0)
-    asked = play(parameters, 105.0, 16 * (APART + 0.05))
+    asked = play(parameters, 105.0, len(NAMES) * (APART + 0.05))
     assert tuple(name for _, name in asked) == NAMES
     assert all(b - a >= APART - 1e-9 for (a, _), (b, _) in pairwise(asked))
 

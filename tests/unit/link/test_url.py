@@ -111,6 +111,7 @@ def test_words_say_what_is_done() -> None:
         ("/dev/ttyACM0,0", "the baud rate must be a number"),
         ("serial:", "names no device; write for example /dev/ttyACM0,57600"),
         ("logs/flight", "there is no such file; write the path of a recorded .tlog"),
+        ("/", "is a folder; write the path of a recorded .tlog"),
         ("flight", "is neither a connection nor a file that exists; write for example udp:127.0.0.1:14550, /dev/"),
         ("", "is neither a connection nor a file that exists"),
     ],

@@ -72,6 +72,8 @@ class PublisherConfig:
 
     type: str
     options: Mapping[str, object] = field(default_factory=dict)
+    where: str = field(default="", compare=False)
+    """`file:line:column`; empty if no file names it."""
 
 
 @dataclass(frozen=True, slots=True)

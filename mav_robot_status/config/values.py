@@ -160,7 +160,7 @@ def _publisher(node: Node) -> PublisherConfig:
     if "type" not in given:
         raise node.fault(f"{node.name} has no 'type': write a publisher's name, or {{type: ..., with its options}}")
     name = _text(given.pop("type"))
-    return PublisherConfig(name, {key: option.plain() for key, option in given.items()})
+    return PublisherConfig(name, {key: option.plain() for key, option in given.items()}, node.at)
 
 
 _KINDS: Final[dict[Any, Callable[[Node], Any]]] = {

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 from ..clock import Instant
 from ..config import ControllerConfig, PublisherConfig
 from ..controller import IndustrialRobotStatusController
-from ..errors import ConfigError, MavRobotStatusError
+from ..errors import ConfigError, MavRobotStatusError, UsageError
 from ..hardware.robot_hw import MavlinkRobotHW
 from ..hardware.tracked import Slot
 from ..interface import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle, LinkState, PublisherContext
@@ -21,7 +21,7 @@ from . import plugins
 from .guard import Guard, GuardedPublisher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Iterator
+    from collections.abc import Callable, Container, Iterator, Mapping
 
     from ..config import Config
     from ..hardware.tracked import Tracked
@@ -43,17 +43,29 @@ DEFAULT_CONTROLLER: Final = ControllerConfig(
 
 
 def check(config: Config) -> None:
-    """Raise ConfigError for a controller or publisher that is not registered, or a handle that nobody registers."""
+    """Raise ConfigError for a controller or publisher that is not registered, an option of a publisher that it does not
+    have, or a handle that nobody registers."""
     handles = [v.handle for v in config.vehicles] or [DEFAULT_HANDLE_NAME]
     for controller in config.controllers:
         plugins.load(plugins.CONTROLLERS, controller.type, controller.where)
         for publisher in _publishers(controller):
-            plugins.load(plugins.PUBLISHERS, publisher.type, controller.where)
+            _check_publisher(publisher, publisher.where or controller.where)
         name = handle_name(controller)
         if name not in handles and not _is_default(controller):
             there_are = f"there is no handle '{name}'; registered: " + ", ".join(f"'{h}'" for h in handles)
             hint = "" if config.vehicles else f". Write `vehicles: [{{handle: {name}}}]` to register it"
             raise ConfigError(f"{controller.where}: {there_are}{hint}")
+
+
+def _check_publisher(publisher: PublisherConfig, where: str) -> None:
+    made = plugins.load(plugins.PUBLISHERS, publisher.type, where)
+    check_options: Callable[[Mapping[str, object]], object] | None = getattr(made, "check_options", None)
+    if check_options is None:
+        return
+    try:
+        check_options(publisher.options)
+    except UsageError as error:
+        raise ConfigError(f"{publisher.where}: {error}") if publisher.where else error from None
 
 
 def handle_name(controller: ControllerConfig) -> str:

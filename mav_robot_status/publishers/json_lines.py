@@ -13,7 +13,7 @@ from ..errors import LinkError, UsageError
 from ..interface import RobotMode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from ..clock import Instant
     from ..interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg
@@ -86,15 +86,22 @@ class JsonLinesPublisher:
     written for another reason (a full disk).
     """
 
-    def __init__(self, context: PublisherContext) -> None:
-        options = context.options
-        path = str(options.get("path", "-"))
-        self._format = str(options.get("format", "native"))
-        if self._format not in FORMATS:
-            raise UsageError(f"json: format '{self._format}' is none of {', '.join(FORMATS)}")
+    @staticmethod
+    def check_options(options: Mapping[str, object]) -> None:
+        """Raises UsageError for an option that there is not, or that cannot be so."""
         unknown = sorted(set(options) - {"path", "format", "changes_only"})
         if unknown:
             raise UsageError(f"json: unknown option '{unknown[0]}'; there are path, format and changes_only")
+        if options.get("format", "native") not in FORMATS:
+            raise UsageError(f"json: format '{options['format']}' is none of {', '.join(FORMATS)}")
+        if not isinstance(options.get("changes_only", False), bool):
+            raise UsageError(f"json: changes_only must be true or false, not '{options['changes_only']}'")
+
+    def __init__(self, context: PublisherContext) -> None:
+        options = context.options
+        self.check_options(options)
+        path = str(options.get("path", "-"))
+        self._format = str(options.get("format", "native"))
         self.periodic = not options.get("changes_only", False)
         if path == "-":
             self._fd, self._owned = context.stdout.fileno(), False

@@ -11,7 +11,7 @@ from ..errors import UsageError
 from ..interface import LinkState
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
+    from collections.abc import Hashable, Mapping
 
     from ..clock import Instant
     from ..interface import Audience, PublisherContext, RobotStatusMsg
@@ -72,10 +72,15 @@ class ThinnedPublisher(ABC, Generic[S]):
     memory: ClassVar[type]
     """The class S."""
 
+    @classmethod
+    def check_options(cls, options: Mapping[str, object]) -> None:
+        """Raises UsageError for an option: there are none."""
+        for option in options:
+            raise UsageError(f"{cls.name}: unknown option '{option}'; there are none")
+
     def __init__(self, context: PublisherContext) -> None:
         """Raises UsageError for an option: there are none."""
-        for option in context.options:
-            raise UsageError(f"{self.name}: unknown option '{option}'; there are none")
+        self.check_options(context.options)
         self._port = context.mavlink
         self._audiences: list[Audience] = []
         self._told: dict[Hashable, dict[str, S]] = {}

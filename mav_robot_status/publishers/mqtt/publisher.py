@@ -51,8 +51,10 @@ class MqttPublisher:
 
     periodic = True
 
+    check_options = staticmethod(read)
+
     def __init__(self, context: PublisherContext, clock: Callable[[], Instant] = present) -> None:
-        options = read(context.options)
+        options = self.check_options(context.options)
         self._naming = Naming(options.robot)
         try:
             from . import courier

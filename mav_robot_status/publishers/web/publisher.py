@@ -33,8 +33,10 @@ class HttpPublisher:
 
     periodic = True
 
+    check_options = staticmethod(read)
+
     def __init__(self, context: PublisherContext) -> None:
-        options = read(context.options)
+        options = self.check_options(context.options)
         try:
             from .scrape import Scrapes
             from .serve import serve

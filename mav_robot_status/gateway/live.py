@@ -121,14 +121,16 @@ class Live:
                 rest = self._rested - now.mono
                 if 0 < rest < wait:
                     time.sleep(rest)
+                    wait -= rest
                 # rounded up to milliseconds: rounded down, the loop would spin until the moment has come
                 events = poll.poll(math.ceil(wait * 1000) if wait > 0 else 0)
                 if self._config.coalesce and events:
                     self._gather(due)
                 now = self._clock()
-                limit = self._limit(now.mono)
-                for descriptor, _ in events:
-                    self._receive(descriptor, now, limit)
+                if events:
+                    limit = self._limit(now.mono)
+                    for descriptor, _ in events:
+                        self._receive(descriptor, now, limit)
         finally:
             self.close()
 

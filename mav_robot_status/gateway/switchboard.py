@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 NONE: Final[frozenset[tuple[int, int]]] = frozenset()
+BATCH: Final = 64
+"""Pieces read before they are parsed: bounds what a flood of long ones takes of memory."""
 SETUP_SIGNING: Final = 256
 """Carries a key: passed on to nobody."""
 
@@ -118,14 +120,33 @@ class Switchboard:
                 poll.register(descriptor, select.POLLIN)
                 self._watched[descriptor] = station
 
-    def receive(self, descriptor: int, now: Instant, limit: int = 64) -> list[tuple[Frame, Channel]]:
-        """What has come on the link with this descriptor, of the kinds that a status needs, and from where."""
+    def receive(self, descriptor: int, now: Instant, limit: int = BATCH) -> list[tuple[Frame, Channel]]:
+        """What has come on the link with this descriptor, of the kinds that a status needs, and from where.
+
+        At most `limit` datagrams or BATCH pieces of a stream; with a limit of 1 it does not look for more.
+        """
         heard: list[tuple[Frame, Channel]] = []
         station = self._watched.get(descriptor)
         if station is None:
             return heard
         link = station.link
-        pieces: Sequence[tuple[bytes, Address]] = link.receive(limit)
+        while limit > 0:
+            pieces = link.receive(min(limit, BATCH))
+            if pieces:
+                self._hear(station, pieces, now, heard)
+            limit = 0 if link.stream or len(pieces) < BATCH else limit - BATCH
+        if link.stream and link.due() <= now.mono:  # the connection has ended
+            self.stirred = True
+        return heard
+
+    def _hear(
+        self,
+        station: Station,
+        pieces: Sequence[tuple[bytes, Address]],
+        now: Instant,
+        heard: list[tuple[Frame, Channel]],
+    ) -> None:
+        """Add to `heard` what is believed of these pieces."""
         if len(pieces) > 1 and not self._keep_all:
             pieces = _joined(pieces)
         for data, source in pieces:
@@ -137,9 +158,6 @@ class Switchboard:
             for frame in frames:
                 if self._believes(frame, channel, now):
                     heard.append((frame, channel))
-        if link.stream and link.due() <= now.mono:  # the connection has ended
-            self.stirred = True
-        return heard
 
     def _believes(self, frame: Frame, channel: Channel, now: Instant) -> bool:
         """Whether a frame is one that the hardware is to take; what is meant for us is dealt with."""

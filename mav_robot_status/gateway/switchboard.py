@@ -131,33 +131,22 @@ class Switchboard:
             return heard
         link = station.link
         while limit > 0:
-            pieces = link.receive(min(limit, BATCH))
-            if pieces:
-                self._hear(station, pieces, now, heard)
-            limit = 0 if link.stream or len(pieces) < BATCH else limit - BATCH
+            pieces: Sequence[tuple[bytes, Address]] = link.receive(limit if limit < BATCH else BATCH)
+            limit = limit - BATCH if len(pieces) == BATCH and not link.stream else 0
+            if len(pieces) > 1 and not self._keep_all:
+                pieces = _joined(pieces)
+            for data, source in pieces:
+                channel = station.channel(source)
+                frames = channel.parser.feed(data)
+                if self._keep_all:
+                    self._pass_on(data, frames, channel, now)
+                    frames = [frame for frame in frames if frame.message_id in WANTED_IDS]
+                for frame in frames:
+                    if self._believes(frame, channel, now):
+                        heard.append((frame, channel))
         if link.stream and link.due() <= now.mono:  # the connection has ended
             self.stirred = True
         return heard
-
-    def _hear(
-        self,
-        station: Station,
-        pieces: Sequence[tuple[bytes, Address]],
-        now: Instant,
-        heard: list[tuple[Frame, Channel]],
-    ) -> None:
-        """Add to `heard` what is believed of these pieces."""
-        if len(pieces) > 1 and not self._keep_all:
-            pieces = _joined(pieces)
-        for data, source in pieces:
-            channel = station.channel(source)
-            frames = channel.parser.feed(data)
-            if self._keep_all:
-                self._pass_on(data, frames, channel, now)
-                frames = [frame for frame in frames if frame.message_id in WANTED_IDS]
-            for frame in frames:
-                if self._believes(frame, channel, now):
-                    heard.append((frame, channel))
 
     def _believes(self, frame: Frame, channel: Channel, now: Instant) -> bool:
         """Whether a frame is one that the hardware is to take; what is meant for us is dealt with."""

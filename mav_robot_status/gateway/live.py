@@ -7,6 +7,7 @@ import math
 import select
 import signal
 import socket
+import time
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, Final
 
@@ -32,7 +33,11 @@ log = logging.getLogger(__name__)
 HEARTBEAT_PERIOD: Final = 1.0  # s
 FIRST_SILENCE, LATER_SILENCE = 3.5, 30.0  # s until the log says that no autopilot is heard, and again
 LONGEST_WAIT: Final = 1.0  # s
-MOST_AT_ONCE, MOST_GATHERED = 64, 1024
+PACE: Final = 0.002
+"""Seconds between two wake-ups when they come faster than that for long: each costs as much as ten frames do."""
+AT_ONCE: Final = 8 * PACE
+"""So many wake-ups may follow each other without a rest: nothing that comes alone or in a burst is delayed."""
+MOST_AT_ONCE: Final = 1024
 """Datagrams read before anything else is done: all that may have gathered, but a flood must not stop the rest."""
 
 
@@ -49,7 +54,7 @@ class Live:
         """Open everything. Raises LinkError, ConfigError. `notifier`: tells systemd; None: there is nobody to tell."""
         self._clock = clock
         self._notifier = Notifier({}) if notifier is None else notifier
-        self._beat_at = self._told_at = -math.inf
+        self._beat_at = self._told_at = self._rested = -math.inf
         self._stop = self._hung_up = False
         self._reread: Callable[[], Config] | None = None
         self._handlers: dict[int, Any] = {}
@@ -110,15 +115,22 @@ class Live:
                     self.switchboard.watch(poll)
                     self.turn(now)
                     due = min(self._next_due(now.mono), now.mono + LONGEST_WAIT)
+                    now = self._clock()
                 due = min(due, self.plant.hw.deadline)
-                wait = due - self._clock().mono
+                wait = due - now.mono
+                rest = self._rested - now.mono
+                if 0 < rest < wait:
+                    time.sleep(rest)
+                    wait -= rest
                 # rounded up to milliseconds: rounded down, the loop would spin until the moment has come
                 events = poll.poll(math.ceil(wait * 1000) if wait > 0 else 0)
                 if self._config.coalesce and events:
                     self._gather(due)
                 now = self._clock()
-                for descriptor, _ in events:
-                    self._receive(descriptor, now)
+                if events:
+                    limit = self._limit(now.mono)
+                    for descriptor, _ in events:
+                        self._receive(descriptor, now, limit)
         finally:
             self.close()
 
@@ -130,6 +142,8 @@ class Live:
         """Everything that is due at `now`."""
         self._notifier.turn(now.mono)
         self.switchboard.service(now.mono)
+        while self.switchboard.conflicts:
+            self.plant.hw.conflict(self.switchboard.conflicts.pop(), now)
         self.plant.tick(now)
         if self._asks:
             self._ask(now)
@@ -191,7 +205,6 @@ class Live:
         """Everything that this configuration names is open."""
         self._config = config
         self._asks = config.requests == "missing" and not all(link.passive for link in config.links)
-        self._at_once = MOST_GATHERED if config.coalesce else MOST_AT_ONCE
         if self.plant.publishes("mavlink"):
             self.switchboard.offered |= {ROBOT_STATUS}
 
@@ -201,17 +214,28 @@ class Live:
         if seconds > 0:
             select.select([self._wake_read], [], [], seconds)
 
-    def _receive(self, descriptor: int, now: Instant) -> None:
+    def _limit(self, now: float) -> int:
+        """How many datagrams to read after waking up `now`, and from when on to wake up again.
+
+        One if nothing came for a while: most come alone, and to look for a second costs more than it is to read it.
+        """
+        rested = now - AT_ONCE
+        if self._rested < rested and not self._config.coalesce:
+            self._rested = rested + PACE
+            return 1
+        self._rested = min(max(self._rested, rested), now) + PACE
+        return MOST_AT_ONCE
+
+    def _receive(self, descriptor: int, now: Instant, limit: int = MOST_AT_ONCE) -> None:
+        heard = self.switchboard.receive(descriptor, now, limit)
+        if not heard:
+            return
         hw = self.plant.hw
-        for frame, channel in self.switchboard.receive(descriptor, now, self._at_once):
-            tracked = self.plant.take(frame, now)
+        hw.speak_as(self._config.identity.system, self.switchboard.voice.component.id)
+        for frame, channel in heard:
+            tracked = hw.take(frame, now)
             if tracked is not None and tracked.ids is not None:
                 self.switchboard.heard_vehicle(tracked.ids, channel, now.mono)
-        hw.speak_as(self._config.identity.system, self.switchboard.voice.component.id)
-        if self.switchboard.conflicts:
-            for ids in self.switchboard.conflicts:
-                hw.conflict(ids, now)
-            self.switchboard.conflicts.clear()
 
     def _ask(self, now: Instant) -> None:
         for ask in self.plant.hw.write(now, self.switchboard.passive_vehicles()):

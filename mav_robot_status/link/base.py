@@ -27,8 +27,10 @@ class Link(Protocol):
     """What the link is, in words: `listening on 127.0.0.1:14550/udp`."""
     stream: bool
     """True if frames may be cut anywhere (serial, TCP); False for datagrams."""
-    dropped: int
-    """What could not be sent, and what the kernel says it dropped on receipt."""
+
+    @property
+    def dropped(self) -> int:
+        """What could not be sent, and what the kernel says it dropped on receipt."""
 
     def fileno(self) -> int:
         """The descriptor to wait on for input; -1 once closed, and while a UDP link waits for a name or an address.
@@ -38,7 +40,7 @@ class Link(Protocol):
         """
 
     def receive(self, limit: int = 64) -> list[Received]:
-        """What is waiting, at most `limit` pieces; empty if nothing is.
+        """What is waiting, at most `limit` pieces; empty if nothing is. With a limit of 1 it does not look for more.
 
         A connection that turns out to be broken is let go, and `service` is due at once.
         """

@@ -45,18 +45,13 @@ SocketAddress = tuple[Any, ...]
 
 
 class UdpLink:
-    """A UDP socket as a `Link`; what the kinds have in common.
-
-    The kernel's drop counter is read when a `receive` reached its limit, and only then: a queue that overflowed is
-    longer than that. It costs nothing at ordinary rates; SO_RXQ_OVFL needs recvmsg, a third more for every datagram.
-    """
+    """A UDP socket as a `Link`; what the kinds have in common."""
 
     stream = False
 
     def __init__(self, url: Url, chance: Chance = random.random) -> None:
         self.text = url.words()
-        self.dropped = 0
-        self._kernel_dropped = 0
+        self._unsent = self._overflown = 0
         self._socket: socket.socket | None = None
         self._peer: SocketAddress | None = None
         self._unreachable: dict[SocketAddress, str] = {}
@@ -73,6 +68,15 @@ class UdpLink:
         """The local port; 0 while there is none."""
         return int(self._socket.getsockname()[1]) if self._socket else 0
 
+    @property
+    def dropped(self) -> int:
+        """What could not be sent, and what found no room in the socket's queue: the kernel counts that."""
+        if self._socket is not None:
+            with suppress(OSError, struct.error):  # closed, or a kernel that does not tell
+                told = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size)
+                self._overflown = _MEMINFO.unpack(told)[-1]
+        return self._unsent + self._overflown
+
     def receive(self, limit: int = 64) -> list[Received]:
         """The datagrams that are waiting, at most `limit`; `source` is the sender's socket address."""
         pieces: list[Received] = []
@@ -83,8 +87,7 @@ class UdpLink:
             for _ in range(limit):
                 pieces.append(new(Received, receive(_LARGEST)))
         except OSError:  # nothing more; or an error that an earlier send left behind, which this read has cleared
-            return pieces
-        self._count_kernel_drops()
+            pass
         return pieces
 
     def send(self, data: bytes, to: Address = None) -> bool:
@@ -99,7 +102,7 @@ class UdpLink:
                 if self._unreachable:
                     self._tell_reachable(target)
                 return True
-        self.dropped += 1
+        self._unsent += 1
         return False
 
     def due(self) -> float:
@@ -116,17 +119,11 @@ class UdpLink:
         """Close the socket."""
         self._due = math.inf
         if self._socket:
+            self._unsent, self._overflown = self.dropped, 0  # the kernel cannot tell afterwards
             self._socket.close()
 
     def _serve(self, now: float) -> None:
         """What this kind does when its time has come."""
-
-    def _count_kernel_drops(self) -> None:
-        with suppress(OSError, struct.error):  # a kernel that does not tell
-            assert self._socket is not None
-            total = _MEMINFO.unpack(self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size))[-1]
-            self.dropped += (total - self._kernel_dropped) & 0xFFFFFFFF
-            self._kernel_dropped = total
 
     def _tell_unreachable(self, target: SocketAddress, error: OSError) -> None:
         """Say once that a target cannot be reached. Bounded: there may be as many targets as there are addresses."""

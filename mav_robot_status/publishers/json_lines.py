@@ -6,7 +6,8 @@ import json
 import math
 import os
 import select
-from typing import TYPE_CHECKING, Any, Final
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
 
 from ..clock import rfc3339
 from ..errors import LinkError, UsageError
@@ -16,37 +17,44 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from ..clock import Instant
-    from ..interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg
+    from ..interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg, Vehicle
 
 PIPE_BUF: Final = 4096
 """Bytes that a pipe which poll() calls writable takes without blocking (PIPE_BUF of Linux)."""
 CHUNK: Final = 1 << 16  # bytes written at once on replay
 RETRY: Final = 0.005  # s until a full pipe is tried again
 LOOK: Final = 1.0  # s between looks whether the reader is still there, while there is nothing to write
-WORDS: Final = {-1: None, 0: False, 1: True}
+WORDS: Final = {-1: "null", 0: "false", 1: "true"}
+MODES: Final = {int(mode): mode.name for mode in RobotMode}
 
 
 def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
-    """The part of a native line that stays while the status does: all but stamp, seq and heartbeat_age."""
-    body: dict[str, Any] = {
-        "handle": handle,
-        "system": detail.system,
-        "component": detail.component,
-        "mode": RobotMode(status.mode).name,
-        "e_stopped": WORDS[status.e_stopped],
-        "drives_powered": WORDS[status.drives_powered],
-        "motion_possible": WORDS[status.motion_possible],
-        "in_motion": WORDS[status.in_motion],
-        "in_error": WORDS[status.in_error],
-        "error_code": status.error_code,
-        "errors": [
-            {"code": e.code, "name": e.name, "text": e.text, "since": rfc3339(e.since_us)} for e in detail.errors
-        ],
-        "inhibits": [{"name": i.name, "text": i.text, "since": rfc3339(i.since_us)} for i in detail.inhibits],
-        "vehicle": detail.vehicle._asdict(),
-        "link": {"state": detail.link.value},
-    }
-    return json.dumps(body)[1:-2]  # without the outer braces, and open behind link.state
+    """The part of a native line that stays while the status does: all but stamp, seq and heartbeat_age.
+
+    It is open behind link.state. What the encoder of `json` takes its time for is asked of it where there is something
+    new only: a line that says that something has changed is one that somebody waits for.
+    """
+    errors = [{"code": e.code, "name": e.name, "text": e.text, "since": rfc3339(e.since_us)} for e in detail.errors]
+    inhibits = [{"name": i.name, "text": i.text, "since": rfc3339(i.since_us)} for i in detail.inhibits]
+    return (
+        f'{_who(handle, detail.system, detail.component)}, "mode": "{MODES[status.mode]}", '
+        f'"e_stopped": {WORDS[status.e_stopped]}, "drives_powered": {WORDS[status.drives_powered]}, '
+        f'"motion_possible": {WORDS[status.motion_possible]}, "in_motion": {WORDS[status.in_motion]}, '
+        f'"in_error": {WORDS[status.in_error]}, "error_code": {status.error_code}, '
+        f'"errors": {json.dumps(errors) if errors else "[]"}, '
+        f'"inhibits": {json.dumps(inhibits) if inhibits else "[]"}, '
+        f'"vehicle": {_vehicle(detail.vehicle)}, "link": {{"state": "{detail.link.value}"'
+    )
+
+
+@lru_cache(maxsize=256)
+def _who(handle: str, system: int | None, component: int | None) -> str:
+    return json.dumps({"handle": handle, "system": system, "component": component})[1:-1]
+
+
+@lru_cache(maxsize=256)
+def _vehicle(vehicle: Vehicle) -> str:
+    return json.dumps(vehicle._asdict())
 
 
 def native(msg: RobotStatusMsg, seq: int, body: str) -> str:

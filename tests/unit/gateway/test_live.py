@@ -16,7 +16,7 @@ import pytest
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.config import Config, IdentityConfig, LinkConfig, PublisherConfig
 from mav_robot_status.errors import LinkError
-from mav_robot_status.gateway.live import Live
+from mav_robot_status.gateway.live import AT_ONCE, MOST_AT_ONCE, PACE, Live
 from mav_robot_status.gateway.plant import DEFAULT_CONTROLLER
 from mav_robot_status.link.udp import UdpLink
 from mav_robot_status.mavlink.definitions import Heartbeat
@@ -28,9 +28,13 @@ HERE = LinkConfig("udpin:127.0.0.1:0")
 
 
 class Turning(Live):
-    """Counts its turns."""
+    """Counts its turns, and how often it reads."""
 
-    turns = 0
+    turns = reads = 0
+
+    def _receive(self, descriptor: int, now: Instant, limit: int = MOST_AT_ONCE) -> None:
+        self.reads += 1
+        super()._receive(descriptor, now, limit)
 
     def turn(self, now: Instant) -> None:
         self.turns += 1
@@ -112,6 +116,38 @@ def test_input_gathers_while_coalescing(stdout: TextIO, vehicle: socket.socket) 
     thread.join(5)
     assert time.monotonic() - before < 1.0
     assert live.turns < 10
+
+
+def test_wake_ups_that_follow_each_other_fast_are_spaced(stdout: TextIO, vehicle: socket.socket) -> None:
+    live = Turning(Config(links=(HERE,)), stdout)
+    thread = threading.Thread(target=live.run)
+    thread.start()
+    begun = time.monotonic()
+    for _ in range(1000):
+        vehicle.sendto(autopilot(), address(live))
+        time.sleep(0.0001)
+    live.stop()
+    thread.join(5)
+    assert live.reads < 1.5 * (time.monotonic() - begun + AT_ONCE) / PACE  # what is due meanwhile wakes it up, too
+    assert live.reads < 750
+
+
+def test_what_comes_alone_is_read_at_once_and_with_it_what_comes_soon_after(stdout: TextIO) -> None:
+    with closing(Live(Config(links=(HERE,)), stdout)) as live:
+        assert [live._limit(now) for now in (1.0, 1.0001, 1.002, 1.5, 1.51)] == [1, MOST_AT_ONCE, MOST_AT_ONCE, 1, 1]
+
+
+def test_frames_of_two_addresses_are_heard_in_the_order_in_which_they_came(
+    stdout: TextIO, vehicle: socket.socket
+) -> None:
+    live = Live(Config(links=(HERE,)), stdout)
+    with closing(live), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
+        for sequence, sender in enumerate((vehicle, vehicle, second, vehicle, second, second)):
+            sender.sendto(autopilot(1 + (sender is second), sequence), address(live))
+        live.switchboard.watch(select.poll())
+        heard = live.switchboard.receive(live.stations[0].link.fileno(), Instant(1.0, 0))
+    assert [(frame.sequence, frame.system) for frame, _ in heard] == [(0, 1), (1, 1), (2, 2), (3, 1), (4, 2), (5, 2)]
+    assert len({channel for _, channel in heard}) == 2
 
 
 def test_what_fails_half_way_leaves_nothing_open(stdout: TextIO, vehicle: socket.socket) -> None:

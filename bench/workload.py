@@ -36,11 +36,11 @@ STILL_MS: Final = 1500
 SENT: Final[dict[str, int]] = {
     # a status needs these
     "heartbeat": 10, "sys_status": 10, "system_time": 10, "gps_raw_int": 10, "attitude": 10,
-    "global_position_int": 10, "vfr_hud": 10, "servo_output_raw": 20, "statustext": 2,
+    "global_position_int": 10, "vfr_hud": 10, "servo_output_raw": 20, "ekf_status_report": 40, "statustext": 2,
     # and these only pass by
     "raw_imu": 50, "scaled_imu2": 50, "scaled_imu3": 50, "scaled_pressure": 50, "scaled_pressure2": 40,
     "power_status": 50, "meminfo": 50, "nav_controller_output": 40, "mission_current": 48, "rc_channels": 20,
-    "ahrs": 40, "ahrs2": 40, "ekf_status_report": 40, "vibration": 50, "battery_status": 20, "terrain_report": 20,
+    "ahrs": 40, "ahrs2": 40, "vibration": 50, "battery_status": 20, "terrain_report": 20,
     "position_target_global_int": 50,
 }  # fmt: skip
 """Kind of message -> how often in ten seconds."""
@@ -55,6 +55,7 @@ FIXED: Final[dict[str, dict[str, Any]]] = {
                    "onboard_control_sensors_health_extended": 0},
     "gps_raw_int": {"fix_type": 6},
     "global_position_int": {"vx": 500, "vy": 100, "vz": 0},
+    "ekf_status_report": {"flags": 831},  # all is measured
     "vfr_hud": {"airspeed": 5.0, "groundspeed": 5.0, "throttle": 40},
     "statustext": {"severity": 6, "text": b"EKF3 IMU0 is using GPS", "id": 0, "chunk_seq": 0},
     "servo_output_raw": {"port": 0, "servo1_raw": 1500, "servo2_raw": 1510, "servo3_raw": 1490, "servo4_raw": 1505},

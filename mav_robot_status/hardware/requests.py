@@ -63,17 +63,18 @@ COMMON: Final = (
     _wanted(2, 1.0),  # SYSTEM_TIME
 )
 OUTPUT_WATCH: Final = (_wanted(36, 2.0), _wanted(74, 2.0))  # SERVO_OUTPUT_RAW, VFR_HUD
+ESTIMATOR: Final = (_wanted(193, 0.5),)  # EKF_STATUS_REPORT: its word counts for ten seconds
 WATCHED_FAMILIES: Final = frozenset({Family.COPTER, Family.ROVER, Family.PLANE, Family.SUB})
 CURRENT_MODE: Final = (_wanted(436, 1.0),)
 AVAILABLE_MODES: Final = 435
-STREAMS: Final = {1: 2, 36: 3, 33: 6, 32: 6, 30: 10, 74: 11, 2: 12}
+STREAMS: Final = {1: 2, 36: 3, 33: 6, 32: 6, 30: 10, 74: 11, 2: 12, 193: 12}
 """The MAV_DATA_STREAM that a message belongs to on ArduPilot (`GCS_MAVLINK_*::data_stream_send` of Copter 3.x)."""
 
 
 def wanted_of(stack: Stack, family: Family, watch_outputs: bool) -> tuple[Wanted, ...]:
     """What a status needs of this kind of vehicle; all together stay within BUDGET."""
     if stack is Stack.ARDUPILOT:
-        return COMMON + OUTPUT_WATCH if watch_outputs and family in WATCHED_FAMILIES else COMMON
+        return COMMON + ESTIMATOR + (OUTPUT_WATCH if watch_outputs and family in WATCHED_FAMILIES else ())
     return COMMON + CURRENT_MODE if stack is Stack.PX4 else COMMON
 
 

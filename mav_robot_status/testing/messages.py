@@ -10,6 +10,7 @@ from ..mavlink.pymavlink_dialect import (
     MAVLink_attitude_message,
     MAVLink_available_modes_message,
     MAVLink_current_mode_message,
+    MAVLink_ekf_status_report_message,
     MAVLink_extended_sys_state_message,
     MAVLink_global_position_int_message,
     MAVLink_heartbeat_message,
@@ -28,6 +29,8 @@ HEARTBEAT, SYS_STATUS = 0, 1
 HOME = (-353632610, 1491652300, 584000)
 """1e-7 degrees and mm. The vehicle is always here, however it moves: a status does not depend on it."""
 CHUNK = 50
+NOT_OF_ARDUPILOT, ONLY_OF_ARDUPILOT = {436}, {193}
+ESTIMATED, UNAIDED = 0x33F, 0xA7  # EKF_STATUS_FLAGS: all there is; attitude and height alone, taken to stand
 
 
 class Snapshot(NamedTuple):
@@ -96,6 +99,11 @@ def _current_mode(s: Snapshot) -> MAVLink_message:
     return MAVLink_current_mode_message(standard_mode, number, number)
 
 
+def _ekf_status_report(s: Snapshot) -> MAVLink_message:
+    flags = ESTIMATED if s.state.position else UNAIDED
+    return MAVLink_ekf_status_report_message(flags, 0.1, 0.1, 0.1, 0.1, 0.0)
+
+
 BUILDERS: dict[int, Callable[[Snapshot], MAVLink_message]] = {
     HEARTBEAT: heartbeat,
     SYS_STATUS: _sys_status,
@@ -105,6 +113,7 @@ BUILDERS: dict[int, Callable[[Snapshot], MAVLink_message]] = {
     33: _global_position,
     36: _servo_outputs,
     74: _vfr_hud,
+    193: _ekf_status_report,
     245: _extended_sys_state,
     436: _current_mode,
 }
@@ -115,7 +124,7 @@ def can_send(firmware: Firmware, message_id: int) -> bool:
     return (
         message_id in BUILDERS
         and message_id != HEARTBEAT
-        and not (firmware.autopilot == ARDUPILOT and message_id == 436)
+        and message_id not in (NOT_OF_ARDUPILOT if firmware.autopilot == ARDUPILOT else ONLY_OF_ARDUPILOT)
         and (firmware.on_request is None or message_id in firmware.on_request)
     )
 

@@ -216,3 +216,8 @@ def test_all_that_is_asked_for_stays_within_the_budget(stack: Stack, family: Fam
         wanted = wanted_of(stack, family, watch_outputs)
         assert set(COMMON) <= set(wanted)
         assert sum(w.rate * w.size for w in wanted) < BUDGET
+
+
+def test_only_ardupilot_is_asked_whether_its_speed_is_measured() -> None:
+    asked_of = {stack: {w.name for w in wanted_of(stack, Family.SUB, watch_outputs=False)} for stack in Stack}
+    assert {stack for stack, names in asked_of.items() if "EKF_STATUS_REPORT" in names} == {Stack.ARDUPILOT}

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from mav_robot_status.hardware.hearing.movement import CONST_POS_MODE
 from mav_robot_status.testing.firmwares import ARDUROVER, PX4_QUAD
 from mav_robot_status.testing.messages import BUILDERS, Snapshot, can_send, statustexts
 from mav_robot_status.testing.scenario import Text
@@ -28,6 +29,14 @@ def test_servo_outputs_can_be_set_directly() -> None:
 def test_only_px4_has_current_mode() -> None:
     assert can_send(PX4_QUAD, 436)
     assert not can_send(ARDUROVER, 436)
+
+
+def test_only_ardupilot_says_whether_its_speed_is_measured() -> None:
+    lost = SNAPSHOT._replace(state=SNAPSHOT.state._replace(position=False))
+    assert can_send(ARDUROVER, 193)
+    assert not can_send(PX4_QUAD, 193)
+    flags = [BUILDERS[193](snapshot).to_dict()["flags"] for snapshot in (lost, SNAPSHOT)]
+    assert [bool(int(flag) & CONST_POS_MODE) for flag in flags] == [True, False]
 
 
 def test_short_ardupilot_texts_have_no_number_and_long_ones_come_in_chunks() -> None:

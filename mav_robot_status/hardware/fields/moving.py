@@ -42,8 +42,10 @@ def in_motion(view: View) -> Finding:
         why = Evidence("no estimate, but the GPS receiver stands still", "GPS_RAW_INT.vel", memory.observation.gps.at)
     else:
         return UNKNOWN, Evidence("no fresh speed")
-    if value is UNKNOWN and slow and aircraft and landed_state == ON_GROUND and not view.armed:
-        value = FALSE  # not slow for long enough, but the land detector agrees
+    if value is UNKNOWN and slow:
+        # not slow for long enough, but the land detector agrees, or the receiver, which has stood still for long enough
+        landed_disarmed = aircraft and landed_state == ON_GROUND and not view.armed
+        value = FALSE if landed_disarmed or _gps_stands_still(view) else UNKNOWN
     if value is FALSE and view.armed and aircraft and landed_state == UNDEFINED and not _on_ground(view):
         return UNKNOWN, Evidence("armed, and nothing tells whether it is airborne", source, at)
     return value, why

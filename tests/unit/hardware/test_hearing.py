@@ -449,3 +449,20 @@ def test_states_of_failsafe_are_dated_from_their_beginning() -> None:
     since = flight.detail.errors[0].since_us
     flight.wait(5)
     assert flight.detail.errors[0].since_us == since
+
+
+@pytest.mark.parametrize(("receiver", "first"), [(True, TriState.FALSE), (False, TriState.UNKNOWN)])
+def test_beside_a_receiver_that_stands_still_a_new_estimate_need_not_be_slow_for_a_second(
+    receiver: bool, first: TriState
+) -> None:
+    flight = copter()
+    still = mav.GpsRawInt(*[0] * len(mav.GpsRawInt._fields))._replace(fix_type=3)
+    if receiver:
+        flight.stream("gps", lambda: still, hz=5)
+    flight.wait(2.0)
+    assert flight.status.in_motion is first
+    flight.stream("global", lambda: here(flight, 0.05, 0.0, 0.0), hz=5)
+    flight.wait(0.5)
+    assert flight.status.in_motion is first
+    flight.wait(1.0)
+    assert flight.status.in_motion is TriState.FALSE

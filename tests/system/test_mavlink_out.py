@@ -143,7 +143,7 @@ def test_a_silent_copter_is_asked_one_command_at_a_time_for_what_is_missing(
     gateway: Callable[..., Gateway], autopilot: Callable[..., FakeAutopilot], tmp_path: Path
 ) -> None:
     """Beside it run those that must not ask: what flows, on a passive link, with `requests: none`."""
-    streams = {1: 2.0, 245: 2.0, 33: 4.0, 30: 4.0, 2: 1.0, 36: 2.0, 74: 2.0}
+    streams = {1: 2.0, 245: 2.0, 33: 4.0, 30: 4.0, 2: 1.0, 36: 2.0, 74: 2.0, 193: 0.5}
     config = tmp_path / "none.yaml"
     config.write_text('links: ["udpin:127.0.0.1:0"]\nrequests: none\n')
     variants = (

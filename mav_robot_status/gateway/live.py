@@ -251,7 +251,8 @@ class Live:
     def _tell_losses(self) -> None:
         for tracked in self.plant.hw.vehicles:
             if tracked.losses and tracked.ids is not None:
-                log.info("vehicle %d.%d was lost %d times", *tracked.ids, tracked.losses)
+                times = "once" if tracked.losses == 1 else f"{tracked.losses} times"
+                log.info("vehicle %d.%d was lost %s", *tracked.ids, times)
 
     def _tell_silence(self, now: Instant) -> None:
         if any(self.plant.hw.vehicles):

@@ -80,5 +80,5 @@ DEMO = Scenario(
         step(32.5, "the link is back, and so is the status", action=Action.RESUME),
         step(34.0, "the end", action=Action.END),
     ),
-    streams={1: 2.0, 245: 2.0, 33: 4.0, 30: 4.0, 74: 2.0, 2: 1.0, 36: 2.0},
+    streams={1: 2.0, 245: 2.0, 33: 4.0, 30: 4.0, 74: 2.0, 2: 1.0, 36: 2.0, 193: 1.0},
 )

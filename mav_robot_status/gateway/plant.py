@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..config import Config
     from ..hardware.tracked import Tracked
     from ..interface import Detail, MavlinkPort, Metrics, Publisher, RobotStatus
-    from ..mavlink.framing import Frame
+    from ..mavlink.framing import Values
 
 NEVER: Final = Instant(0.0, 0)
 """The time of a plant that has not lived yet."""
@@ -198,7 +198,7 @@ class Plant:
         """Whether there is a publisher of this type."""
         return any(name == kind for name, _ in self.publishers)
 
-    def take(self, frame: Frame, now: Instant) -> Tracked | None:
+    def take(self, frame: Values, now: Instant) -> Tracked | None:
         """Take one frame; the vehicle if it is an autopilot's heartbeat."""
         return self.hw.take(frame, now)
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ..link.log import Stamped
-    from ..mavlink.framing import Frame
+    from ..mavlink.framing import Values
 
 
 class Recording:
@@ -30,9 +30,9 @@ class Recording:
         """Raises UsageError at the end if there was nothing in it that is MAVLink."""
         return timed(chain.from_iterable(self._frames()), lambda: self._parser.last_stamp, self.counts)
 
-    def _frames(self) -> Iterator[list[Frame]]:
+    def _frames(self) -> Iterator[list[Values]]:
         for block in self._reader.blocks():
-            yield self._parser.feed(block)
+            yield self._parser.walk(block)
         counters = self._parser.counters
         if not counters.frames and not counters.unknown:
             raise UsageError(

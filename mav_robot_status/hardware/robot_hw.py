@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
 
     from ..clock import Instant
-    from ..mavlink.framing import Frame
+    from ..mavlink.framing import Values
     from .memory import Memory
 
 log = logging.getLogger(__name__)
@@ -89,18 +89,18 @@ class MavlinkRobotHW(RobotHW):
         """Our ids, which acknowledgements come back to; `system` None: that of the vehicle that is spoken to."""
         self._asking.own_system, self._asking.own_component = system, component
 
-    def take(self, frame: Frame, now: Instant) -> Tracked | None:
+    def take(self, frame: Values, now: Instant) -> Tracked | None:
         """Take one frame. Returns the vehicle whose autopilot's heartbeat it is, None for everything else."""
         message_id, system, component, _, message, _, _ = frame
         kind = KINDS.get(message_id)
         if kind is None:
             if message_id in COMMAND_IDS:
-                self._overhear(frame, now)
+                self._overhear(message, (system, component), now)
             return None
         tracked = self._tracked.get((system, component))
         beating = None
         if message_id == HEARTBEAT_ID:
-            tracked = beating = self._beating(tracked, message, frame, now)
+            tracked = beating = self._beating(tracked, message, (system, component), now)
         if tracked is None:
             return None
         memory = tracked.memory
@@ -227,19 +227,20 @@ class MavlinkRobotHW(RobotHW):
                 tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
                 self.changed = True
 
-    def _overhear(self, frame: Frame, now: Instant) -> None:
+    def _overhear(self, message: mav.CommandInt | mav.CommandLong, sender: tuple[int, int], now: Instant) -> None:
         """A command of a ground station to one of the vehicles."""
-        message = frame.message
         for (system, component), tracked in self._tracked.items():
             addressed = message.target_system == system and message.target_component in (0, component)
             if addressed and tracked.memory is not None:
-                overheard(tracked.memory, message, (frame.system, frame.component), now)
+                overheard(tracked.memory, message, sender, now)
 
-    def _beating(self, tracked: Tracked | None, heartbeat: mav.Heartbeat, frame: Frame, now: Instant) -> Tracked | None:
+    def _beating(
+        self, tracked: Tracked | None, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant
+    ) -> Tracked | None:
         """The vehicle whose autopilot sent this heartbeat, if any did."""
         if tracked is None:
-            tracked = self._discover(heartbeat, (frame.system, frame.component), now)
-        elif not is_autopilot(heartbeat, frame.component):
+            tracked = self._discover(heartbeat, ids, now)
+        elif not is_autopilot(heartbeat, ids[1]):
             return None
         if tracked is not None:
             tracked.handle.heard_at = now.mono

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import UsageError
@@ -46,20 +46,14 @@ for good: what was known before is of another time.
 """
 
 
-class _Record(Protocol):
-    """Something in a log."""
-
-    @property
-    def stamp(self) -> int:
-        """Microseconds since 1970, as the log says."""
-
-
+Record = tuple[Any, ...]
+"""Something in a log: whatever it is, its last value is its stamp, microseconds since 1970 as the log says."""
 END = -1
 """In place of the stamp behind the end of a log."""
 _NEVER = -(1 << 63)
 
 
-def timed(records: Iterable[_Record], last: Callable[[], int], counts: Counts) -> Iterator[Stamped]:
+def timed(records: Iterable[Record], last: Callable[[], int], counts: Counts) -> Iterator[Stamped]:
     """Say when each record was heard, and then, with None, when the log ended; nothing of a log without records.
 
     `last` gives the stamp at the end of the log once all records were read.
@@ -67,9 +61,9 @@ def timed(records: Iterable[_Record], last: Callable[[], int], counts: Counts) -
     clock = _Clock(counts)
     latest, limit, segment, mono = clock.state()
     stamp = 0
-    record: _Record | None = None
+    record: Record | None = None
     for following in records:
-        next_stamp = following.stamp
+        next_stamp = following[-1]
         # Nearly every record is neither before the last one nor after the next one.
         if latest <= stamp <= next_stamp and stamp <= limit:
             latest = stamp

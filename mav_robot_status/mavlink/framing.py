@@ -99,6 +99,10 @@ class Frame(NamedTuple):
         return raw[header : header + raw[1]]
 
 
+Values = tuple[int, int, int, int, Any, bytes, int]
+"""Those of a Frame, in a plain tuple: it is made and taken apart in a third of the time."""
+
+
 @dataclass(slots=True)
 class Counters:
     """What came in, by kind; all counted since the parser was made."""
@@ -208,7 +212,12 @@ class Parser:
         self._in_step = True
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The wanted frames that these bytes complete, in order. Never raises, keeps at most MAX_FRAME bytes.
+        """The wanted frames that these bytes complete, in order. Never raises, keeps at most MAX_FRAME bytes."""
+        found: list[Any] = self.walk(data)
+        return [new(Frame, values) for values in found] if found else found
+
+    def walk(self, data: bytes) -> list[Values]:
+        """What `feed` gives, as plain tuples.
 
         One loop with local names and without a call or an object for a frame that nobody wants: a few hundred
         nanoseconds a frame is what the whole gateway's speed rests on.
@@ -221,7 +230,7 @@ class Parser:
         version, unpack, header, seed = self._format
         speaker, upcoming = self._speaker, self._upcoming
         system, component = speaker & 255, speaker >> 8
-        frames: list[Frame] = []
+        frames: list[Values] = []
         message: Any
         good = since = old = 0
         stamped = i = self._stamp_size
@@ -286,7 +295,7 @@ class Parser:
                             message = new(kind, fields(data[end - length : end].ljust(whole, b"\0")))
                     raw = data[before : i - stamped] if flags or self._keep_all else b""
                     stamp = STAMP(data, before - stamped)[0] if stamped else 0
-                    frames.append(new(Frame, (message_id, system, component, sequence, message, raw, stamp)))
+                    frames.append((message_id, system, component, sequence, message, raw, stamp))
         except struct.error:
             pass  # the data ends within a header
         self._speaker, self._upcoming = speaker, upcoming

@@ -37,12 +37,12 @@ def heartbeat(memory: Memory, message: Heartbeat, now: Instant, options: Hardwar
     last = before.runs[-1].last
     connected = now.mono - last <= options.heartbeat_timeout
     pulse = memory.pulse = next_beat(before, message, now, connected)
-    enabled = _outputs_enabled(memory)
+    enabled = not pulse.armed and _outputs_enabled(memory)
     outputs.heard_beat(memory.watch, pulse, before, enabled, memory.vehicle_type, now.mono)
     seen = memory.observation
     previous: Heartbeat = seen.heartbeat.message if seen.heartbeat else message
     seen.heartbeat = heard(message, now.mono, seen.heartbeat)
-    if _starts_anew(previous, message, memory):
+    if message != previous and _starts_anew(previous, message, memory):
         rebooted(memory, boot_rules.Boot(now.mono), now)
     if now.mono - last > LONG_LOSS:
         memory.latches, memory.stop = causes.NO_LATCHES, estop.NOTHING

@@ -15,6 +15,7 @@ from mav_robot_status.gateway.recorded import Recording
 from mav_robot_status.link.log import DAY_US, Counts, Stamped
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.framing import Frame
 
 START = 1_700_000_000_000_000
 SECOND = 1_000_000
@@ -50,7 +51,7 @@ def seconds(found: list[Stamped]) -> list[int]:
 
 
 def numbers(found: list[Stamped]) -> list[int]:
-    return [frame.message.custom_mode for _, frame, _ in found if frame is not None]
+    return [Frame(*frame).message.custom_mode for _, frame, _ in found if frame is not None]
 
 
 def test_each_frame_comes_at_its_time_and_the_end_at_the_last(recording: Write) -> None:

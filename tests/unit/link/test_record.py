@@ -62,7 +62,7 @@ def write(path: Path, *numbers: int) -> None:
 
 
 def numbers(path: Path) -> list[int]:
-    return [frame.message.custom_mode for _, frame, _ in Recording(str(path)) if frame is not None]
+    return [Frame(*frame).message.custom_mode for _, frame, _ in Recording(str(path)) if frame is not None]
 
 
 def frames_of(path: Path) -> list[Frame]:
@@ -130,7 +130,7 @@ def test_what_is_written_is_read_by_our_own_reader(flight: Path) -> None:
     writer.close()
     found = [(now, frame) for now, frame, _ in Recording(str(flight)) if frame is not None]
     assert [now.unix_us - START for now, _ in found] == list(range(300))
-    assert [frame.message.custom_mode for _, frame in found] == list(range(300))
+    assert [Frame(*frame).message.custom_mode for _, frame in found] == list(range(300))
 
 
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
@@ -555,7 +555,7 @@ def test_a_killed_process_loses_a_second_and_tears_one_record_at_most(flight: Pa
         process.wait(TIME_OUT)
     before = flight.read_bytes()
     recording = Recording(str(flight))
-    found = [frame.message.custom_mode for _, frame, _ in recording if frame is not None]
+    found = [Frame(*frame).message.custom_mode for _, frame, _ in recording if frame is not None]
     assert found[:1000] == list(range(1000))
     assert found == sorted(set(found))
     torn = len(before) % len(stamped(0))

@@ -59,19 +59,21 @@ def timed(records: Iterable[Record], last: Callable[[], int], counts: Counts) ->
     `last` gives the stamp at the end of the log once all records were read.
     """
     clock = _Clock(counts)
-    latest, limit, segment, mono = clock.state()
+    latest = limit = segment = _NEVER
+    mono = 0.0
     stamp = 0
     record: Record | None = None
     for following in records:
         next_stamp = following[-1]
         # Nearly every record is neither before the last one nor after the next one.
-        if latest <= stamp <= next_stamp and stamp <= limit:
-            latest = stamp
+        if stamp <= next_stamp <= limit:
             yield new(Instant, (mono + (stamp - segment) * 1e-6, stamp)), record, False
+            latest = stamp
         elif record is not None:
             clock.latest = latest
             yield clock.stamped(record, stamp, next_stamp)
-            latest, limit, segment, mono = clock.state()
+            latest, segment, mono = clock.latest, clock.segment, clock.mono
+            limit = latest + DAY_US if latest <= next_stamp <= latest + DAY_US else _NEVER
         record, stamp = following, next_stamp
     if record is not None:
         clock.latest = latest
@@ -90,11 +92,6 @@ class _Clock:
         """The stamp that time has reached; the one at which the segment started."""
         self.mono = 0.0
         """Where the segment started."""
-
-    def state(self) -> tuple[int, int, int, float]:
-        """The stamp that time has reached, the last one that may follow it, the segment's first, and where that is."""
-        limit = _NEVER if self.latest == _NEVER else self.latest + DAY_US
-        return self.latest, limit, self.segment, self.mono
 
     def stamped(self, what: Any, stamp: int, following: int) -> Stamped:
         """When something was heard, by its stamp and the one `following` it."""

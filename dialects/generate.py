@@ -46,6 +46,20 @@ USED = (
     "ROBOT_STATUS"
 ).split()
 
+# Fields that nobody reads of the messages that come most often; a frame that we write has zeros there.
+UNREAD = {
+    "SYS_STATUS": "load voltage_battery current_battery drop_rate_comm errors_comm errors_count3 errors_count4 "
+    "battery_remaining",
+    "GPS_RAW_INT": "time_usec lat lon alt eph epv cog satellites_visible alt_ellipsoid h_acc v_acc vel_acc hdg_acc yaw",
+    "ATTITUDE": "roll pitch yaw",
+    "LOCAL_POSITION_NED": "x y z",
+    "GLOBAL_POSITION_INT": "alt relative_alt hdg",
+    "SERVO_OUTPUT_RAW": "time_usec",
+    "VFR_HUD": "airspeed alt heading",
+    "EKF_STATUS_REPORT": "velocity_variance pos_horiz_variance pos_vert_variance compass_variance terrain_alt_variance "
+    "airspeed_variance",
+}
+
 # Enumerations whose names reach the user; the prefix is cut off.
 ENUMS = {
     "AUTOPILOT_NAMES": ("MAV_AUTOPILOT", "MAV_AUTOPILOT_"),
@@ -79,6 +93,27 @@ def field_code(field: mavparse.MAVField) -> tuple[str, str]:
     return STRUCT_CODES[field.type], "float" if field.type in ("float", "double") else "int"
 
 
+def known_fields(message: mavparse.MAVType) -> list[mavparse.MAVField]:
+    """The fields of a message, in wire order, that the gateway knows."""
+    unread = UNREAD.get(message.name, "").split()
+    assert {f.name for f in message.ordered_fields}.issuperset(unread), message.name
+    return [f for f in message.ordered_fields if f.name not in unread]
+
+
+def layout(message: mavparse.MAVType) -> str:
+    """The struct of the known fields, up to the last of them."""
+    known = known_fields(message)
+    codes = ""
+    skipped = 0
+    for field in message.ordered_fields:
+        if field not in known:
+            skipped += max(field.array_length, 1) * field.type_length
+            continue
+        codes += (f"{skipped}x" if skipped else "") + field_code(field)[0]
+        skipped = 0
+    return "<" + codes
+
+
 def definitions(files: list[mavparse.MAVXML]) -> str:
     """The text of definitions.py."""
     crc = dict(UPSTREAM_CRC_EXTRA)
@@ -94,16 +129,19 @@ def definitions(files: list[mavparse.MAVXML]) -> str:
         message = messages[name]
         out.append(f"class {class_name(name)}(NamedTuple):\n")
         out.append(f'    """{name}, id {message.id}; fields in wire order, arrays as raw bytes."""\n\n')
-        out += [f"    {f.name}: {field_code(f)[1]}{SHADOWS.get(f.name, '')}\n" for f in message.ordered_fields]
+        known = known_fields(message)
+        out += [f"    {f.name}: {field_code(f)[1]}{SHADOWS.get(f.name, '')}\n" for f in known]
         out.append("\n\n")
     out.append("class Definition(NamedTuple):\n")
-    out.append('    """How one message is laid out: `layout` spans all fields, extensions included."""\n\n')
-    out.append("    id: int\n    name: str\n    layout: Struct\n    type: Any\n\n\n")
+    out.append(
+        '    """How one message is laid out: `size` in bytes, extensions included; `layout` of the known fields."""\n\n'
+    )
+    out.append("    id: int\n    name: str\n    size: int\n    layout: Struct\n    type: Any\n\n\n")
     out.append("MESSAGES: Final[dict[int, Definition]] = {\n")
     for name in USED:
         m = messages[name]
-        layout = "<" + "".join(field_code(f)[0] for f in m.ordered_fields)
-        out.append(f'    {m.id}: Definition({m.id}, "{name}", Struct("{layout}"), {class_name(name)}),\n')
+        row = f'{m.id}, "{name}", {m.wire_length}, Struct("{layout(m)}"), {class_name(name)}'
+        out.append(f"    {m.id}: Definition({row}),\n")
     out.append("}\n")
     for table, (enum, prefix) in ENUMS.items():
         out.append(f"{table}: Final[dict[int, str]] = {{\n")

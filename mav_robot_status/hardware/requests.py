@@ -52,7 +52,7 @@ class Wanted(NamedTuple):
 
 def _wanted(message_id: int, rate: float, instead: int | None = None) -> Wanted:
     definition = mav.MESSAGES[message_id]
-    return Wanted(message_id, definition.name, rate, definition.layout.size + 12, instead)
+    return Wanted(message_id, definition.name, rate, definition.size + 12, instead)
 
 
 COMMON: Final = (

@@ -24,16 +24,8 @@ class SysStatus(NamedTuple):
     onboard_control_sensors_present: int
     onboard_control_sensors_enabled: int
     onboard_control_sensors_health: int
-    load: int
-    voltage_battery: int
-    current_battery: int
-    drop_rate_comm: int
-    errors_comm: int
     errors_count1: int
     errors_count2: int
-    errors_count3: int
-    errors_count4: int
-    battery_remaining: int
     onboard_control_sensors_present_extended: int
     onboard_control_sensors_enabled_extended: int
     onboard_control_sensors_health_extended: int
@@ -76,31 +68,14 @@ class ParamValue(NamedTuple):
 class GpsRawInt(NamedTuple):
     """GPS_RAW_INT, id 24; fields in wire order, arrays as raw bytes."""
 
-    time_usec: int
-    lat: int
-    lon: int
-    alt: int
-    eph: int
-    epv: int
     vel: int
-    cog: int
     fix_type: int
-    satellites_visible: int
-    alt_ellipsoid: int
-    h_acc: int
-    v_acc: int
-    vel_acc: int
-    hdg_acc: int
-    yaw: int
 
 
 class Attitude(NamedTuple):
     """ATTITUDE, id 30; fields in wire order, arrays as raw bytes."""
 
     time_boot_ms: int
-    roll: float
-    pitch: float
-    yaw: float
     rollspeed: float
     pitchspeed: float
     yawspeed: float
@@ -110,9 +85,6 @@ class LocalPositionNed(NamedTuple):
     """LOCAL_POSITION_NED, id 32; fields in wire order, arrays as raw bytes."""
 
     time_boot_ms: int
-    x: float
-    y: float
-    z: float
     vx: float
     vy: float
     vz: float
@@ -124,18 +96,14 @@ class GlobalPositionInt(NamedTuple):
     time_boot_ms: int
     lat: int
     lon: int
-    alt: int
-    relative_alt: int
     vx: int
     vy: int
     vz: int
-    hdg: int
 
 
 class ServoOutputRaw(NamedTuple):
     """SERVO_OUTPUT_RAW, id 36; fields in wire order, arrays as raw bytes."""
 
-    time_usec: int
     servo1_raw: int
     servo2_raw: int
     servo3_raw: int
@@ -168,11 +136,8 @@ class RequestDataStream(NamedTuple):
 class VfrHud(NamedTuple):
     """VFR_HUD, id 74; fields in wire order, arrays as raw bytes."""
 
-    airspeed: float
     groundspeed: float
-    alt: float
     climb: float
-    heading: int
     throttle: int
 
 
@@ -302,13 +267,7 @@ class AvailableModesMonitor(NamedTuple):
 class EkfStatusReport(NamedTuple):
     """EKF_STATUS_REPORT, id 193; fields in wire order, arrays as raw bytes."""
 
-    velocity_variance: float
-    pos_horiz_variance: float
-    pos_vert_variance: float
-    compass_variance: float
-    terrain_alt_variance: float
     flags: int
-    airspeed_variance: float
 
 
 class EscTelemetry1To4(NamedTuple):
@@ -361,45 +320,46 @@ class RobotStatus(NamedTuple):
 
 
 class Definition(NamedTuple):
-    """How one message is laid out: `layout` spans all fields, extensions included."""
+    """How one message is laid out: `size` in bytes, extensions included; `layout` of the known fields."""
 
     id: int
     name: str
+    size: int
     layout: Struct
     type: Any
 
 
 MESSAGES: Final[dict[int, Definition]] = {
-    0: Definition(0, "HEARTBEAT", Struct("<IBBBBB"), Heartbeat),
-    1: Definition(1, "SYS_STATUS", Struct("<IIIHHhHHHHHHbIII"), SysStatus),
-    2: Definition(2, "SYSTEM_TIME", Struct("<QI"), SystemTime),
-    11: Definition(11, "SET_MODE", Struct("<IBB"), SetMode),
-    20: Definition(20, "PARAM_REQUEST_READ", Struct("<hBB16s"), ParamRequestRead),
-    22: Definition(22, "PARAM_VALUE", Struct("<fHH16sB"), ParamValue),
-    24: Definition(24, "GPS_RAW_INT", Struct("<QiiiHHHHBBiIIIIH"), GpsRawInt),
-    30: Definition(30, "ATTITUDE", Struct("<Iffffff"), Attitude),
-    32: Definition(32, "LOCAL_POSITION_NED", Struct("<Iffffff"), LocalPositionNed),
-    33: Definition(33, "GLOBAL_POSITION_INT", Struct("<IiiiihhhH"), GlobalPositionInt),
-    36: Definition(36, "SERVO_OUTPUT_RAW", Struct("<IHHHHHHHHBHHHHHHHH"), ServoOutputRaw),
-    66: Definition(66, "REQUEST_DATA_STREAM", Struct("<HBBBB"), RequestDataStream),
-    74: Definition(74, "VFR_HUD", Struct("<ffffhH"), VfrHud),
-    75: Definition(75, "COMMAND_INT", Struct("<ffffiifHBBBBB"), CommandInt),
-    76: Definition(76, "COMMAND_LONG", Struct("<fffffffHBBB"), CommandLong),
-    77: Definition(77, "COMMAND_ACK", Struct("<HBBiBB"), CommandAck),
-    244: Definition(244, "MESSAGE_INTERVAL", Struct("<iH"), MessageInterval),
-    245: Definition(245, "EXTENDED_SYS_STATE", Struct("<BB"), ExtendedSysState),
-    252: Definition(252, "NAMED_VALUE_INT", Struct("<Ii10s"), NamedValueInt),
-    253: Definition(253, "STATUSTEXT", Struct("<B50sHB"), Statustext),
-    291: Definition(291, "ESC_STATUS", Struct("<Q16s16s16sB"), EscStatus),
-    410: Definition(410, "EVENT", Struct("<IIHBBB40s"), Event),
-    435: Definition(435, "AVAILABLE_MODES", Struct("<IIBBB35s"), AvailableModes),
-    436: Definition(436, "CURRENT_MODE", Struct("<IIB"), CurrentMode),
-    437: Definition(437, "AVAILABLE_MODES_MONITOR", Struct("<B"), AvailableModesMonitor),
-    193: Definition(193, "EKF_STATUS_REPORT", Struct("<fffffHf"), EkfStatusReport),
-    11030: Definition(11030, "ESC_TELEMETRY_1_TO_4", Struct("<8s8s8s8s8s4s"), EscTelemetry1To4),
-    11031: Definition(11031, "ESC_TELEMETRY_5_TO_8", Struct("<8s8s8s8s8s4s"), EscTelemetry5To8),
-    11032: Definition(11032, "ESC_TELEMETRY_9_TO_12", Struct("<8s8s8s8s8s4s"), EscTelemetry9To12),
-    59900: Definition(59900, "ROBOT_STATUS", Struct("<QiIBBbbbbbb"), RobotStatus),
+    0: Definition(0, "HEARTBEAT", 9, Struct("<IBBBBB"), Heartbeat),
+    1: Definition(1, "SYS_STATUS", 43, Struct("<III10xHH5xIII"), SysStatus),
+    2: Definition(2, "SYSTEM_TIME", 12, Struct("<QI"), SystemTime),
+    11: Definition(11, "SET_MODE", 6, Struct("<IBB"), SetMode),
+    20: Definition(20, "PARAM_REQUEST_READ", 20, Struct("<hBB16s"), ParamRequestRead),
+    22: Definition(22, "PARAM_VALUE", 25, Struct("<fHH16sB"), ParamValue),
+    24: Definition(24, "GPS_RAW_INT", 52, Struct("<24xH2xB"), GpsRawInt),
+    30: Definition(30, "ATTITUDE", 28, Struct("<I12xfff"), Attitude),
+    32: Definition(32, "LOCAL_POSITION_NED", 28, Struct("<I12xfff"), LocalPositionNed),
+    33: Definition(33, "GLOBAL_POSITION_INT", 28, Struct("<Iii8xhhh"), GlobalPositionInt),
+    36: Definition(36, "SERVO_OUTPUT_RAW", 37, Struct("<4xHHHHHHHHBHHHHHHHH"), ServoOutputRaw),
+    66: Definition(66, "REQUEST_DATA_STREAM", 6, Struct("<HBBBB"), RequestDataStream),
+    74: Definition(74, "VFR_HUD", 20, Struct("<4xf4xf2xH"), VfrHud),
+    75: Definition(75, "COMMAND_INT", 35, Struct("<ffffiifHBBBBB"), CommandInt),
+    76: Definition(76, "COMMAND_LONG", 33, Struct("<fffffffHBBB"), CommandLong),
+    77: Definition(77, "COMMAND_ACK", 10, Struct("<HBBiBB"), CommandAck),
+    244: Definition(244, "MESSAGE_INTERVAL", 6, Struct("<iH"), MessageInterval),
+    245: Definition(245, "EXTENDED_SYS_STATE", 2, Struct("<BB"), ExtendedSysState),
+    252: Definition(252, "NAMED_VALUE_INT", 18, Struct("<Ii10s"), NamedValueInt),
+    253: Definition(253, "STATUSTEXT", 54, Struct("<B50sHB"), Statustext),
+    291: Definition(291, "ESC_STATUS", 57, Struct("<Q16s16s16sB"), EscStatus),
+    410: Definition(410, "EVENT", 53, Struct("<IIHBBB40s"), Event),
+    435: Definition(435, "AVAILABLE_MODES", 46, Struct("<IIBBB35s"), AvailableModes),
+    436: Definition(436, "CURRENT_MODE", 9, Struct("<IIB"), CurrentMode),
+    437: Definition(437, "AVAILABLE_MODES_MONITOR", 1, Struct("<B"), AvailableModesMonitor),
+    193: Definition(193, "EKF_STATUS_REPORT", 26, Struct("<20xH"), EkfStatusReport),
+    11030: Definition(11030, "ESC_TELEMETRY_1_TO_4", 44, Struct("<8s8s8s8s8s4s"), EscTelemetry1To4),
+    11031: Definition(11031, "ESC_TELEMETRY_5_TO_8", 44, Struct("<8s8s8s8s8s4s"), EscTelemetry5To8),
+    11032: Definition(11032, "ESC_TELEMETRY_9_TO_12", 44, Struct("<8s8s8s8s8s4s"), EscTelemetry9To12),
+    59900: Definition(59900, "ROBOT_STATUS", 24, Struct("<QiIBBbbbbbb"), RobotStatus),
 }
 AUTOPILOT_NAMES: Final[dict[int, str]] = {
     0: "GENERIC",

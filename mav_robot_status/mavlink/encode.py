@@ -16,9 +16,9 @@ HEADER_V1: Final = struct.Struct("<BBBBBB").pack
 HEADER_V2: Final = struct.Struct("<BBBBBBBHB").pack
 CHECKSUM: Final = struct.Struct(">H").pack
 
-# type of the message -> its id, the packing of its fields
-LAYOUTS: Final[dict[type, tuple[int, Callable[..., bytes]]]] = {
-    d.type: (d.id, d.layout.pack) for d in MESSAGES.values()
+# type of the message -> its id, the bytes of its payload, the packing of its fields
+LAYOUTS: Final[dict[type, tuple[int, int, Callable[..., bytes]]]] = {
+    d.type: (d.id, d.size, d.layout.pack) for d in MESSAGES.values()
 }
 
 
@@ -30,10 +30,9 @@ def encode(message: NamedTuple, *, system: int, component: int, sequence: int, v
     value that does not fit its field or the header, an id over 255 in MAVLink 1. Arrays are cut or zero-filled to fit.
     """
     try:
-        message_id, pack = LAYOUTS[type(message)]
+        message_id, size, pack = LAYOUTS[type(message)]
         payload = pack(*message)
-        if version == 2:
-            payload = payload.rstrip(b"\0") or b"\0"
+        payload = payload.rstrip(b"\0") or b"\0" if version == 2 else payload.ljust(size, b"\0")
         return enclose(message_id, payload, system=system, component=component, sequence=sequence, version=version)
     except KeyError:
         raise ValueError(f"{type(message).__name__} is not a message of mavlink.definitions") from None

@@ -204,7 +204,7 @@ def servo_output_raw(memory: Memory, message: mav.ServoOutputRaw, now: Instant, 
     """SERVO_OUTPUT_RAW: the output watch of ArduPilot."""
     if memory.stack is not ARDUPILOT or not options.watch_outputs or message.port != 0:
         return
-    values = message[1:9] + message[10:18]
+    values = message[:8] + message[9:]
     hud = memory.observation.vfr_hud
     throttle = hud.message.throttle if hud is not None and is_fresh(hud, now.mono, motion.FRESH) else None
     outputs.heard_outputs(

@@ -16,7 +16,7 @@ def beat(ids: tuple[int, int] = VEHICLE) -> Frame:
 
 
 def attitude(clock_ms: int) -> Frame:
-    return Frame(30, *VEHICLE, 0, mav.Attitude(clock_ms, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), b"")
+    return Frame(30, *VEHICLE, 0, mav.Attitude(clock_ms, 0.0, 0.0, 0.0), b"")
 
 
 def heard(paths: Paths[str], frame: Frame, way: str, now: float) -> bool:

@@ -49,7 +49,7 @@ WHO_IS_WHERE = (
     (TABLET, 254, 190),
 )
 
-ATTITUDE = Attitude(1, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
+ATTITUDE = Attitude(1, 5.0, 6.0, 7.0)
 UNKNOWN_ID = 0x7A0001
 
 

@@ -112,9 +112,7 @@ class Flight:
 
     def sys_status(self) -> mav.SysStatus:
         low, high = self.internal_errors & 0xFFFF, self.internal_errors >> 16
-        return mav.SysStatus(
-            self.present, self.enabled, self.health, 0, 12600, 0, 0, 0, low, high, 0, 0, 100, 0, 0, 0
-        )  # fmt: skip
+        return mav.SysStatus(self.present, self.enabled, self.health, low, high, 0, 0, 0)
 
     def system_time(self) -> mav.SystemTime:
         return mav.SystemTime(0, self.boot_ms)

@@ -14,7 +14,7 @@ from .driver import ACTIVE, FITTED, MOTORS, PREARM, STANDBY, TERMINATED, copter,
 
 NOW = Instant(1000.0, 1_800_000_000_000_000)
 ALL = FITTED | PREARM
-READY = SysStatus._make((ALL, ALL, ALL, *[0] * 13))
+READY = SysStatus._make((ALL, ALL, ALL, *[0] * 5))
 NOT_READY = READY._replace(onboard_control_sensors_health=FITTED)
 HIGH, PREARM_TEXT = "RC7: MotorEStop HIGH", "PreArm: Motors Emergency Stopped"
 

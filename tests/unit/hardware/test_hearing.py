@@ -47,15 +47,15 @@ def memory_of(flight: Flight) -> Memory:
 
 def here(flight: Flight, *velocity: float, lat: int = 1) -> mav.GlobalPositionInt:
     vx, vy, vz = (round(v * 100) for v in velocity)
-    return mav.GlobalPositionInt(flight.boot_ms, lat, 0, 0, 0, vx, vy, vz, 0)
+    return mav.GlobalPositionInt(flight.boot_ms, lat, 0, vx, vy, vz)
 
 
 def local(flight: Flight, *velocity: float) -> mav.LocalPositionNed:
-    return mav.LocalPositionNed._make((flight.boot_ms, 0, 0, 0, *velocity))
+    return mav.LocalPositionNed(flight.boot_ms, *velocity)
 
 
 def hud(ground: float, climb: float) -> mav.VfrHud:
-    return mav.VfrHud(0.0, ground, 0.0, climb, 0, 0)
+    return mav.VfrHud(ground, climb, 0)
 
 
 def moving(flight: Flight, message: Any, seconds: float = 2.0) -> TriState:
@@ -94,7 +94,7 @@ def test_two_autopilots_that_take_turns_with_the_same_ids_are_a_conflict_until_o
 
 def test_two_clocks_that_come_in_turn_from_one_router_are_a_conflict_and_no_reboots_while_armed() -> None:
     flight = copter().set(armed=True)
-    still = mav.Attitude(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    still = mav.Attitude(0, 0.0, 0.0, 0.0)
     flight.stream("attitude", lambda: still._replace(time_boot_ms=flight.boot_ms + 900_000), hz=2)
     flight.stream("attitude of the other", lambda: still._replace(time_boot_ms=flight.boot_ms), hz=2)
     doubled = flight.stream("system_time of the other", flight.system_time, hz=2)
@@ -237,7 +237,7 @@ AIDED, CONSTANT = 0x33F, 0xA7  # EKF_STATUS_FLAGS as recorded: with GPS, and wit
 
 
 def estimating(flight: Flight, flags: int) -> Flight:
-    return flight.stream("estimator", lambda: mav.EkfStatusReport(0.0, 0.0, 0.0, 0.0, 0.0, flags, 0.0), hz=2)
+    return flight.stream("estimator", lambda: mav.EkfStatusReport(flags), hz=2)
 
 
 def test_a_sub_without_a_position_is_not_called_still() -> None:
@@ -317,7 +317,7 @@ def test_the_global_position_goes_before_the_local_one_and_that_before_the_hud()
 @pytest.mark.parametrize(("vehicle_type", "expected"), [(ROVER, TRUE), (11, FALSE)])
 def test_a_boat_that_only_rolls_does_not_move(vehicle_type: int, expected: TriState) -> None:
     flight = Flight(vehicle_type=vehicle_type).hb(armed=True, state=ACTIVE)
-    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0, 0, 0, 0.5, math.nan, 0.0), hz=5)
+    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0.5, math.nan, 0.0), hz=5)
     assert moving(flight, lambda: here(flight, 0.01, 0, 0)) is expected
 
 
@@ -396,7 +396,7 @@ def test_motors_at_rest_say_nothing() -> None:
 
 def test_outputs_are_not_watched_if_the_site_does_not_want_it() -> None:
     flight = copter(options=HardwareOptions(watch_outputs=False))
-    flight.send(mav.ServoOutputRaw._make((0, *[1000] * 8, 0, *[0] * 8)))
+    flight.send(mav.ServoOutputRaw._make((*[1000] * 8, 0, *[0] * 8)))
     assert memory_of(flight).watch.values == ()
 
 

@@ -26,7 +26,7 @@ def changes(flight: Flight, seconds: float) -> list[float]:
 
 def test_messages_that_repeat_themselves_need_no_new_status() -> None:
     flight = px4()
-    flight.stream("local", lambda: mav.LocalPositionNed(flight.boot_ms, 0, 0, 0, 0, 0, 0), hz=10)
+    flight.stream("local", lambda: mav.LocalPositionNed(flight.boot_ms, 0, 0, 0), hz=10)
     flight.wait(20)
     looks = [flight.vehicle.seen]
     for _ in range(100):  # in five seconds come 60 messages
@@ -93,5 +93,5 @@ def test_a_speed_that_grows_ends_the_verdict_of_the_outputs_at_once() -> None:
     flight.wait(3)
     stopped = flight.status
     assert stopped.e_stopped is TriState.TRUE
-    flight.send(mav.VfrHud(0.0, 0.0, 0.0, 2.0, 0, 100))
+    flight.send(mav.VfrHud(0.0, 2.0, 100))
     assert flight.status.e_stopped is TriState.UNKNOWN

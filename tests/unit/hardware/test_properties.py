@@ -92,7 +92,10 @@ def messages_of(definition: mav.Definition) -> st.SearchStrategy[Any]:
         if character in string.digits:
             digits += character
             continue
-        codes += [("s", int(digits))] if character == "s" else [(character, 1)] * int(digits or 1)
+        if character == "s":
+            codes.append(("s", int(digits)))
+        elif character != "x":
+            codes += [(character, 1)] * int(digits or 1)
         digits = ""
     fields = [values(name, *code) for name, code in zip(definition.type._fields, codes, strict=True)]
     return st.tuples(*fields).map(definition.type._make)
@@ -217,11 +220,11 @@ STREAMS: dict[str, Callable[[Flight, float], Any]] = {
     "sys_status": lambda flight, _: flight.sys_status(),
     "system_time": lambda flight, _: flight.system_time(),
     "landed": lambda _, x: mav.ExtendedSysState(0, round(4 * x)),
-    "global": lambda flight, x: mav.GlobalPositionInt(flight.boot_ms, 1, 1, 0, 0, round(100 * x), 0, 0, 0),
-    "local": lambda flight, x: mav.LocalPositionNed(flight.boot_ms, 0, 0, 0, x, 0, 0),
-    "hud": lambda _, x: mav.VfrHud(0, x, 0, x, 0, round(100 * x)),
-    "attitude": lambda flight, x: mav.Attitude(flight.boot_ms, 0, 0, 0, 0, 0, x / 5),
-    "outputs": lambda _, x: mav.ServoOutputRaw._make((0, *[1000 + 600 * round(x)] * 8, 0, *[0] * 8)),
+    "global": lambda flight, x: mav.GlobalPositionInt(flight.boot_ms, 1, 1, round(100 * x), 0, 0),
+    "local": lambda flight, x: mav.LocalPositionNed(flight.boot_ms, x, 0, 0),
+    "hud": lambda _, x: mav.VfrHud(x, x, round(100 * x)),
+    "attitude": lambda flight, x: mav.Attitude(flight.boot_ms, 0, 0, x / 5),
+    "outputs": lambda _, x: mav.ServoOutputRaw._make((*[1000 + 600 * round(x)] * 8, 0, *[0] * 8)),
     "esc": lambda _, x: mav.EscTelemetry1To4(b"", b"", b"", bytes([round(x)]) * 8, b"", b""),
     "current_mode": lambda flight, x: mav.CurrentMode(flight.mode, flight.mode, round(8 * x)),
 }

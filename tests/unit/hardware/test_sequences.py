@@ -253,12 +253,12 @@ def test_the_speed_of_a_rover_is_judged_with_hysteresis() -> None:
     """Q17"""
     flight = rover().hb(armed=True, state=ACTIVE)
     speed = 0.0
-    flight.stream("position", lambda: mav.LocalPositionNed(flight.boot_ms, 0, 0, 0, speed, 0, 0), hz=10)
+    flight.stream("position", lambda: mav.LocalPositionNed(flight.boot_ms, speed, 0, 0), hz=10)
 
     def drive(at: float) -> None:
         nonlocal speed
         speed = at
-        flight.send(mav.LocalPositionNed(flight.boot_ms, 0, 0, 0, at, 0, 0))
+        flight.send(mav.LocalPositionNed(flight.boot_ms, at, 0, 0))
 
     drive(0.10)
     flight.wait(2)
@@ -382,11 +382,11 @@ class Outputs:
         flight.stream("vfr_hud", self._hud, hz=2).stream("outputs", self._outputs, hz=2)
 
     def _hud(self) -> mav.VfrHud:
-        return mav.VfrHud(0.0, self.speed, 0.0, self.climb, 0, self.throttle)
+        return mav.VfrHud(self.speed, self.climb, self.throttle)
 
     def _outputs(self) -> mav.ServoOutputRaw:
         padded = (self.values + [0] * 16)[:16]
-        return mav.ServoOutputRaw._make((0, *padded[:8], 0, *padded[8:]))
+        return mav.ServoOutputRaw._make((*padded[:8], 0, *padded[8:]))
 
     def set(self, values: list[int], throttle: int) -> None:
         self.values, self.throttle = values, throttle

@@ -34,8 +34,7 @@ def memory_of(inputs: dict[str, Any]) -> tuple[Memory, Instant]:
     if "ss" in inputs:
         words = [*inputs["ss"], 0, 0, 0][:6]
         errors = inputs.get("ierr", 0)
-        counters = (0, 0, 0, 0, 0, errors & 0xFFFF, errors >> 16, 0, 0, 0)
-        status = mav.SysStatus._make((*words[:3], *counters, *words[3:]))
+        status = mav.SysStatus._make((*words[:3], errors & 0xFFFF, errors >> 16, *words[3:]))
         hear(memory, status, before, OPTIONS)
         memory.faults = {bit: f._replace(messages=sensors.DEBOUNCE_MESSAGES) for bit, f in memory.faults.items()}
         ready = estop.READY_MESSAGES if _would_be_ready(memory, status) else 0
@@ -43,9 +42,9 @@ def memory_of(inputs: dict[str, Any]) -> tuple[Memory, Instant]:
     if "landed" in inputs:
         hear(memory, mav.ExtendedSysState(0, inputs["landed"]), before, OPTIONS)
     if "rate" in inputs:
-        hear(memory, mav.Attitude(UPTIME_MS, 0, 0, 0, 0, 0, inputs["rate"]), before, OPTIONS)
+        hear(memory, mav.Attitude(UPTIME_MS, 0, 0, inputs["rate"]), before, OPTIONS)
     if "vel" in inputs:
-        hear(memory, mav.LocalPositionNed(UPTIME_MS, 0, 0, 0, *inputs["vel"]), before, OPTIONS)
+        hear(memory, mav.LocalPositionNed(UPTIME_MS, *inputs["vel"]), before, OPTIONS)
         sustained = NOW.mono - motion.SUSTAIN_OFF
         measured = memory.motion
         measured.fast_since = None if measured.fast_since is None else sustained

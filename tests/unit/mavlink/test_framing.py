@@ -19,7 +19,7 @@ from mav_robot_status.mavlink.framing import MAX_FRAME, MAX_IDS, MAX_SOURCES, OT
 
 RECORDINGS = sorted((pathlib.Path(__file__).parents[4] / "shared" / "recordings" / "sitl").glob("*.tlog"))
 HEARTBEAT = Heartbeat(custom_mode=4, type=2, autopilot=3, base_mode=209, system_status=4, mavlink_version=3)
-ATTITUDE = Attitude(1, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
+ATTITUDE = Attitude(1, 5.0, 6.0, 7.0)
 UNKNOWN_ID = 0x7A0001
 
 

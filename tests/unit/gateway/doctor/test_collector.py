@@ -39,7 +39,7 @@ def ear() -> Ear:
 
 
 def attitude(boot_ms: float) -> Attitude:
-    return Attitude(round(boot_ms), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Attitude(round(boot_ms), 0.0, 0.0, 0.0)
 
 
 def test_who_speaks_what_and_how_often(ear: Ear) -> None:

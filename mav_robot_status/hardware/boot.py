@@ -11,7 +11,7 @@ from typing import Final
 
 STEP_BACK_MS: Final = 2000
 STEP_BACK: Final = STEP_BACK_MS / 1000  # seconds
-WRAP: Final = 1 << 32  # of a clock of 32 bits
+WRAP: Final = 1 << 32  # of a clock of 32 bits, after 49 days
 HALF: Final = WRAP // 2
 GRACE: Final = 10.0
 """Seconds after boot during which sensor bits raise no error."""
@@ -36,15 +36,14 @@ def heard_clock(boot: Boot, time_boot_ms: int, now: float) -> bool:
     """One more sample; whether it shows a reboot."""
     booted = now - time_boot_ms / 1000
     clock_ms = boot.clock_ms
-    step = 1 if clock_ms is None else (time_boot_ms - clock_ms + HALF) % WRAP - HALF  # after 49 days it wraps
-    if step > 0:
+    if clock_ms is None or clock_ms < time_boot_ms < clock_ms + HALF or time_boot_ms < clock_ms - HALF:  # it wraps
         # on its way a sample is only ever held up, so the earliest boot is the truest
         if clock_ms is None or not 0 <= booted - boot.at < STEP_BACK:
             boot.at = booted
         boot.clock_ms = time_boot_ms
         boot.doubt_ms = None
         return False
-    if step >= -STEP_BACK_MS:
+    if (clock_ms - time_boot_ms) % WRAP <= STEP_BACK_MS:
         boot.doubt_ms = None
         return False
     if boot.doubt_ms is None or (time_boot_ms - boot.doubt_ms + HALF) % WRAP < HALF:

@@ -197,16 +197,18 @@ def matters(memory: Memory, options: HardwareOptions) -> Matters:
 def next_change(memory: Memory, after: float, options: HardwareOptions) -> float:
     """The first time (monotonic seconds) later than `after` at which the status may change though nothing is heard."""
     first = inf
-    for at in _ends(memory, after, options):
+    for at in _ends(memory, options):
         if after < at < first:
             first = at
-    return first
+    stale = nextafter(_first_stale(memory, after, options), inf)  # what is fresh at its limit is not old
+    return stale if stale < first else first
 
 
-def _ends(memory: Memory, after: float, options: HardwareOptions) -> Iterator[float]:
-    """When what was heard becomes too old, latches end, doubts are settled."""
+def _first_stale(memory: Memory, after: float, options: HardwareOptions) -> float:
+    """The first limit, at `after` or later, up to which something that was heard counts."""
     seen = memory.observation
     beat, status, mode = seen.heartbeat, seen.sys_status, seen.current_mode
+    first = inf
     for heard in seen:
         if heard is None:
             continue
@@ -217,10 +219,17 @@ def _ends(memory: Memory, after: float, options: HardwareOptions) -> Iterator[fl
             least = options.sys_status_timeout
         elif heard is mode:
             least = CURRENT_MODE_FRESH
-        soon = nextafter(heard.at + least, inf)  # the first time that is later: what is fresh at its limit is not old
-        yield soon if soon > after or heard is beat else nextafter(slowly_fresh_until(heard), inf)
-    if memory.watch.at is not None:
-        yield nextafter(memory.watch.at + motion.FRESH, inf)
+        limit = heard.at + least
+        if limit < after and heard is not beat:
+            limit = slowly_fresh_until(heard)
+        if after <= limit < first:
+            first = limit
+    at = memory.watch.at
+    return at + motion.FRESH if at is not None and after <= at + motion.FRESH < first else first
+
+
+def _ends(memory: Memory, options: HardwareOptions) -> Iterator[float]:
+    """When latches end and doubts are settled."""
     if memory.watch.held_since is not None:
         yield memory.watch.held_since + outputs.HOLD
     yield motion.settles_at(memory.motion)

@@ -58,15 +58,18 @@ def settles_at(motion: Motion) -> float:
 
 def moved(motion: Motion, speed: float | None, rate: float, armed: bool, options: HardwareOptions, now: float) -> None:
     """One more sample: `speed` in m/s (None: not measured, which ends all that was known), `rate` in rad/s."""
-    motion.value = settled(motion, now) if speed is not None else UNKNOWN
     motion.speed = speed
+    if speed is None:
+        motion.value, motion.fast_since, motion.slow_since = UNKNOWN, None, None
+        return
+    motion.value = settled(motion, now)
     on = options.v_on if armed else options.v_on_disarmed
     off = options.v_off if armed else options.v_off_disarmed
-    if speed is None or not (speed > on or rate > RATE_ON):
+    if not (speed > on or rate > RATE_ON):
         motion.fast_since = None
     elif motion.fast_since is None:
         motion.fast_since = now
-    if speed is None or not (speed < off and rate < RATE_OFF):
+    if not (speed < off and rate < RATE_OFF):
         motion.slow_since = None
     elif motion.slow_since is None:
         motion.slow_since = now

@@ -105,13 +105,15 @@ def heard_outputs(
     stop = watch.stop
     known = [abs(values[c - 1] - stop[c]) for c in motors if c in stop and c <= len(values)]  # how far off it, us
     complete = len(known) == len(motors)
-    off_stop = bool(known) and max(known) > OFF_STOP
-    at_stop = complete and bool(known) and max(known) <= AT_STOP
-    all_off = complete and len(known) >= SEVERAL and min(known) > OFF_STOP
+    farthest = max(known) if known else 0
+    off_stop = farthest > OFF_STOP
+    at_stop = complete and bool(known) and farthest <= AT_STOP
     demanded = throttle is not None and throttle >= DEMAND
-    # one of several assumed channels may move a gimbal; the motors of a multirotor all leave their stop value
-    one_will_do = not (assumed and len(motors) >= SEVERAL)
-    watch.proved = watch.proved or (off_stop and demanded and one_will_do) or all_off
+    if not watch.proved:
+        # one of several assumed channels may move a gimbal; the motors of a multirotor all leave their stop value
+        one_will_do = not (assumed and len(motors) >= SEVERAL)
+        all_off = complete and len(known) >= SEVERAL and min(known) > OFF_STOP
+        watch.proved = (off_stop and demanded and one_will_do) or all_off
     if not (at_stop and demanded and watch.proved and watch.driven_seen):
         watch.held_since = None
     elif watch.held_since is None:

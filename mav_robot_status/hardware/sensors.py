@@ -84,12 +84,15 @@ def faulty_mask(status: SysStatus, stack: Stack) -> int:
 
     PX4 enables a required component that is missing, and leaves it out of *present*.
     """
-    low = status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health
-    high = status.onboard_control_sensors_enabled_extended & ~status.onboard_control_sensors_health_extended
+    mask = status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health
     if stack is not PX4:
-        low &= status.onboard_control_sensors_present
-        high &= status.onboard_control_sensors_present_extended
-    return low | high << 32
+        mask &= status.onboard_control_sensors_present
+    if status.onboard_control_sensors_enabled_extended:
+        more = status.onboard_control_sensors_enabled_extended & ~status.onboard_control_sensors_health_extended
+        if stack is not PX4:
+            more &= status.onboard_control_sensors_present_extended
+        mask |= more << 32
+    return mask
 
 
 def heard_faults(faults: Faults, mask: int, now: Instant) -> Faults:

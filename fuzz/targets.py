@@ -84,7 +84,7 @@ def signing(data: bytes) -> int:
         accepted = verifier.accepts(frame, 1_800_000_000_000_000)
         assert not accepted or is_signed(frame)
     raw = b"\xfd" + data[:279]
-    verifier.accepts(Frame(0, 1, 1, 0, None, raw), 0)
+    verifier.accepts(Frame(0, (1, 1), 0, None, raw), 0)
     return count + 1
 
 

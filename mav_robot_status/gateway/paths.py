@@ -102,7 +102,7 @@ class Paths(Generic[C]):
 
     def counts(self, frame: Frame, channel: C, now: float) -> bool:
         """Whether a frame came the way that counts for its vehicle; True for everything that is no vehicle's."""
-        path = self._paths.get((frame.system, frame.component))
+        path = self._paths.get(frame.ids)
         if path is None:
             return True
         way = path.way
@@ -130,7 +130,7 @@ class Paths(Generic[C]):
 
     def conflict(self, frame: Frame, channel: C) -> tuple[C, C] | None:
         """The two ends that claim the ids of this frame, if its clock has just shown so for the PROOFS-th time."""
-        path = self._paths.get((frame.system, frame.component))
+        path = self._paths.get(frame.ids)
         if path is None or path.contradictions < PROOFS:
             return None
         path.contradictions = 0

@@ -71,7 +71,7 @@ class Router(Generic[C]):
         self._where: dict[tuple[int, int], Counter[C]] = {}
         """The same by (system, component) and by (system, WHOLE)."""
         self._channels: tuple[C, ...] = ()
-        self._decisions: dict[tuple[C, int, int, tuple[int, int]], tuple[C, ...]] = {}
+        self._decisions: dict[tuple[C, tuple[int, int], tuple[int, int]], tuple[C, ...]] = {}
         """By channel and sender and target."""
         self._recent: dict[int, object] = {}
         """By hash of the frame: the channel on which it came first, or CAME_AGAIN; of this window."""
@@ -113,15 +113,14 @@ class Router(Generic[C]):
             self._channels = channels
             self._decisions.clear()
         target = _target(frame)
-        system, component = frame.system, frame.component
-        key = came_from, system, component, target
+        key = came_from, frame.ids, target
         decision = self._decisions.get(key)
         if decision is None:
             if target is not UNCHECKED:
-                self.heard(came_from, system, component, now)
+                self.heard(came_from, *frame.ids, now)
             if len(self._decisions) >= MOST_DECISIONS:
                 self._decisions.clear()
-            decision = self._decisions[key] = self._decide(came_from, (system, component), target)
+            decision = self._decisions[key] = self._decide(came_from, frame.ids, target)
         return decision
 
     def plan(

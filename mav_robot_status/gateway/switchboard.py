@@ -153,7 +153,7 @@ class Switchboard:
         verdict = None if trust is None else trust.judge(frame, now)
         if verdict is not None and verdict not in (Verdict.VERIFIED, Verdict.LET_THROUGH):
             if frame.message_id == HEARTBEAT and trust and trust.may_heal(verdict, now.mono):
-                self.voice.beat(channel, frame.system)
+                self.voice.beat(channel, frame.ids[0])
             return False
         station = channel.station
         if frame.message_id == HEARTBEAT:
@@ -168,7 +168,7 @@ class Switchboard:
         if station.is_out:
             return False
         if verdict is Verdict.VERIFIED:  # newer than all that came before, whichever way it came
-            self.paths.take((frame.system, frame.component), channel, now.mono)
+            self.paths.take(frame.ids, channel, now.mono)
             return True
         return self._counts(frame, channel, now.mono)
 
@@ -178,10 +178,9 @@ class Switchboard:
             return True
         ends = self.paths.conflict(frame, channel)
         if ends is not None:
-            ids = frame.system, frame.component
             self.stirred = True
-            self.conflicts.add(ids)
-            log.warning("two autopilots claim the ids %d.%d: %s and %s", *ids, *ends)
+            self.conflicts.add(frame.ids)
+            log.warning("two autopilots claim the ids %d.%d: %s and %s", *frame.ids, *ends)
         return False
 
     def heard_vehicle(self, ids: tuple[int, int], channel: Channel, now: float) -> None:
@@ -197,8 +196,7 @@ class Switchboard:
         """A command, perhaps to us: answer it, and do what it says."""
         hears_statuses = self._hears_statuses(channel.station)
         offered = self.offered if hears_statuses else self.offered - {ROBOT_STATUS}
-        sender = frame.system, frame.component
-        found = answer(frame.message, sender, self.voice.component.speaks_as, channel.interval, offered)
+        found = answer(frame.message, frame.ids, self.voice.component.speaks_as, channel.interval, offered)
         if found is None:
             return
         for reply in found.replies:

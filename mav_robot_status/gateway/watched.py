@@ -135,7 +135,7 @@ class Watched:
         return False
 
     def _count(self, frame: Frame, now: Instant) -> None:
-        ids = frame.system, frame.component
+        ids = frame.ids
         rates = self._rates.get(ids)
         if rates is None:
             rates = self._rates[ids] = Rates()
@@ -156,7 +156,7 @@ class _Shared:
     def take(self, frame: Frame, now: Instant) -> Tracked | None:
         """Take one frame; the vehicle if it is an autopilot's heartbeat."""
         heard = self._plant.take(frame, now)
-        if self._plant.hw.find(frame.system, frame.component) is not None:
+        if self._plant.hw.find(*frame.ids) is not None:
             self._count(frame, now)
         return heard
 

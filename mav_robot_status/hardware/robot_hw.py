@@ -91,16 +91,16 @@ class MavlinkRobotHW(RobotHW):
 
     def take(self, frame: Values, now: Instant) -> Tracked | None:
         """Take one frame. Returns the vehicle whose autopilot's heartbeat it is, None for everything else."""
-        message_id, system, component, _, message, _, _ = frame
+        message_id, ids, _, message, _, _ = frame
         kind = KINDS.get(message_id)
         if kind is None:
             if message_id in COMMAND_IDS:
-                self._overhear(message, (system, component), now)
+                self._overhear(message, ids, now)
             return None
-        tracked = self._tracked.get((system, component))
+        tracked = self._tracked.get(ids)
         beating = None
         if message_id == HEARTBEAT_ID:
-            tracked = beating = self._beating(tracked, message, (system, component), now)
+            tracked = beating = self._beating(tracked, message, ids, now)
         if tracked is None:
             return None
         memory = tracked.memory

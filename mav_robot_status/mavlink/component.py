@@ -78,13 +78,14 @@ class Component:
 
     def heard(self, frame: Frame) -> None:
         """Look at a HEARTBEAT: if another program speaks as we do, or as we could, keep out of its way."""
-        if frame.component not in self._ids:
+        system, component = frame.ids
+        if component not in self._ids:
             return
-        if (frame.component, frame.sequence, frame.message) in self._sent.get(frame.system, ()):
+        if (component, frame.sequence, frame.message) in self._sent.get(system, ()):
             return  # our own, come back through a router
-        if (frame.system, frame.component) not in self._others:
-            self._others.add((frame.system, frame.component))
-            self._step_aside(frame.system)
+        if frame.ids not in self._others:
+            self._others.add(frame.ids)
+            self._step_aside(system)
 
     def _step_aside(self, system: int) -> None:
         """Take another component if ours is taken in a system that we speak for. Each is left only once."""

@@ -79,8 +79,8 @@ class Frame(NamedTuple):
     """One frame with a good CRC."""
 
     message_id: int
-    system: int
-    component: int
+    ids: tuple[int, int]
+    """System and component of its sender."""
     sequence: int
     message: Any
     """A message of `definitions`; None if the id is not among those."""
@@ -99,7 +99,7 @@ class Frame(NamedTuple):
         return raw[header : header + raw[1]]
 
 
-Values = tuple[int, int, int, int, Any, bytes, int]
+Values = tuple[int, tuple[int, int], int, Any, bytes, int]
 """Those of a Frame, in a plain tuple: it is made and taken apart in a third of the time."""
 
 
@@ -229,7 +229,7 @@ class Parser:
         known = self._known
         version, unpack, header, seed = self._format
         speaker, upcoming = self._speaker, self._upcoming
-        system, component = speaker & 255, speaker >> 8
+        ids = speaker & 255, speaker >> 8
         frames: list[Values] = []
         message: Any
         good = since = old = 0
@@ -276,7 +276,7 @@ class Parser:
                 if source != speaker:
                     self._expect(speaker, upcoming)
                     speaker, upcoming = source, self._expected.get(source)
-                    system, component = source & 255, source >> 8
+                    ids = source & 255, source >> 8
                 upcoming = NEXT[sequence] if sequence == upcoming else self._gap(upcoming, sequence)
                 if flags:
                     if flags != SIGNED:
@@ -295,7 +295,7 @@ class Parser:
                             message = new(kind, fields(data[end - length : end].ljust(whole, b"\0")))
                     raw = data[before : i - stamped] if flags or self._keep_all else b""
                     stamp = STAMP(data, before - stamped)[0] if stamped else 0
-                    frames.append((message_id, system, component, sequence, message, raw, stamp))
+                    frames.append((message_id, ids, sequence, message, raw, stamp))
         except struct.error:
             pass  # the data ends within a header
         self._speaker, self._upcoming = speaker, upcoming
@@ -394,5 +394,5 @@ def _unchecked(data: bytes, i: int, following: int) -> Frame:
     """A frame of an unknown id, as its header says it is."""
     raw = data[i:following]
     if raw[0] == V2:
-        return Frame(int.from_bytes(raw[7:10], "little"), raw[5], raw[6], raw[4], None, raw)
-    return Frame(raw[5], raw[3], raw[4], raw[2], None, raw)
+        return Frame(int.from_bytes(raw[7:10], "little"), (raw[5], raw[6]), raw[4], None, raw)
+    return Frame(raw[5], (raw[3], raw[4]), raw[2], None, raw)

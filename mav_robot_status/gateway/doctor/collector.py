@@ -61,7 +61,7 @@ class Collector:
         if frame.message_id not in mav.CRC_EXTRA:
             return  # not checked: its header may be noise
         add(self._good, frame.message_id)
-        ids = frame.system, frame.component
+        ids = frame.ids
         voice = self._voices.get(ids)
         if voice is None:
             if len(self._voices) >= MOST_SPEAKERS:
@@ -129,7 +129,7 @@ class _Voice:
         number, first, _ = self._times.get(frame.message_id, (0, now.mono, 0.0))
         self._times[frame.message_id] = number + 1, first, now.mono
         if frame.message_id == HEARTBEAT:
-            self._beat(frame.message, frame.component)
+            self._beat(frame.message, frame.ids[1])
         elif frame.message_id in CLOCKS:
             message = frame.message
             self._clock(now.mono - message.time_boot_ms / 1000)

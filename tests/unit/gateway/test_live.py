@@ -146,7 +146,7 @@ def test_frames_of_two_addresses_are_heard_in_the_order_in_which_they_came(
             sender.sendto(autopilot(1 + (sender is second), sequence), address(live))
         live.switchboard.watch(select.poll())
         heard = live.switchboard.receive(live.stations[0].link.fileno(), Instant(1.0, 0))
-    assert [(frame.sequence, frame.system) for frame, _ in heard] == [(0, 1), (1, 1), (2, 2), (3, 1), (4, 2), (5, 2)]
+    assert [(frame.sequence, frame.ids[0]) for frame, _ in heard] == [(0, 1), (1, 1), (2, 2), (3, 1), (4, 2), (5, 2)]
     assert len({channel for _, channel in heard}) == 2
 
 
@@ -209,10 +209,10 @@ def test_two_vehicles_are_spoken_for_and_asked_each_at_its_own_address(stdout: T
         time.sleep(0.01)
         receive(live, start)
         live.turn(start)
-        assert {f.system for f in heard(vehicle)} == {f.system for f in heard(second)} == {7, 9}
+        assert {f.ids[0] for f in heard(vehicle)} == {f.ids[0] for f in heard(second)} == {7, 9}
         live.turn(later(start, 3.01))
-        assert [(f.system, f.component) for f in heard(vehicle) if f.message_id == 76] == [(7, 192)]
-        assert [(f.system, f.component) for f in heard(second) if f.message_id == 76] == [(9, 192)]
+        assert [f.ids for f in heard(vehicle) if f.message_id == 76] == [(7, 192)]
+        assert [f.ids for f in heard(second) if f.message_id == 76] == [(9, 192)]
 
 
 def test_a_vehicle_that_moves_to_another_address_is_asked_there(stdout: TextIO, vehicle: socket.socket) -> None:

@@ -12,17 +12,17 @@ VEHICLE = (1, 1)
 
 
 def beat(ids: tuple[int, int] = VEHICLE) -> Frame:
-    return Frame(0, *ids, 0, mav.Heartbeat(0, 2, 3, 0, 3, 3), b"")
+    return Frame(0, ids, 0, mav.Heartbeat(0, 2, 3, 0, 3, 3), b"")
 
 
 def attitude(clock_ms: int) -> Frame:
-    return Frame(30, *VEHICLE, 0, mav.Attitude(clock_ms, 0.0, 0.0, 0.0), b"")
+    return Frame(30, VEHICLE, 0, mav.Attitude(clock_ms, 0.0, 0.0, 0.0), b"")
 
 
 def heard(paths: Paths[str], frame: Frame, way: str, now: float) -> bool:
     counts = paths.counts(frame, way, now)
     if counts and frame.message_id == 0:
-        paths.learn((frame.system, frame.component), way, now)
+        paths.learn(frame.ids, way, now)
     return counts
 
 

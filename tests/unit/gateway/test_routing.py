@@ -65,7 +65,7 @@ def frame_of(message: NamedTuple, system: int = 1, component: int = 1, sequence:
 
 def unknown_frame(system: int = 1, component: int = 1, sequence: int = 0, payload: bytes = b"\x02\x01") -> Frame:
     head = bytes([0xFD, len(payload), 0, 0, sequence, system, component]) + UNKNOWN_ID.to_bytes(3, "little")
-    return Frame(UNKNOWN_ID, system, component, sequence, None, head + payload + b"??")
+    return Frame(UNKNOWN_ID, (system, component), sequence, None, head + payload + b"??")
 
 
 def router() -> Router[End]:

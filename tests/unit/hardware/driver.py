@@ -37,7 +37,7 @@ def frame_of(message: Any, ids: Ids = (1, 1)) -> Frame:
     """A message as the parser gives it: in the precision of the wire."""
     definition = DEFINITIONS[type(message)]
     layout = definition.layout
-    return Frame(definition.id, *ids, 0, type(message)(*layout.unpack(layout.pack(*message))), raw=b"")
+    return Frame(definition.id, ids, 0, type(message)(*layout.unpack(layout.pack(*message))), raw=b"")
 
 
 def statustext(text: str | bytes, severity: int, number: int = 0, chunk: int = 0) -> mav.Statustext:

@@ -21,13 +21,13 @@ def foreign(component: int, system: int = 1, sequence: int = 200) -> Frame:
 
 def speaker(component: Component, system: int = 1) -> tuple[int, int]:
     frame = parsed(component.heartbeat(system))
-    return frame.system, frame.component
+    return frame.ids
 
 
 def test_our_heartbeat_is_a_companions_and_mirrors_the_error() -> None:
     component = Component()
     calm, alarmed = parsed(component.heartbeat(7)), parsed(component.heartbeat(7, in_error=True))
-    assert (calm.system, calm.component, calm.sequence, alarmed.sequence) == (7, 192, 0, 1)
+    assert (*calm.ids, calm.sequence, alarmed.sequence) == (7, 192, 0, 1)
     assert calm.message == Heartbeat(0, 18, 8, 0, 4, 3)
     assert alarmed.message == Heartbeat(0, 18, 8, 0, 5, 3)
 

@@ -51,7 +51,7 @@ def test_golden_frames_are_written_and_read(message: Any, header: tuple[int, int
     data = bytes.fromhex(wire)
     assert encode(message, system=system, component=component, sequence=sequence, version=version) == data
     (frame,) = Parser(None).feed(data)
-    assert (frame.system, frame.component, frame.sequence) == header[:3]
+    assert (*frame.ids, frame.sequence) == header[:3]
     assert (frame.message, frame.raw) == (message, data)
 
 
@@ -82,7 +82,7 @@ def test_an_encoder_numbers_its_frames() -> None:
     encoder = Encoder(1, 191)
     frames = Parser(MESSAGES).feed(b"".join(encoder.frame(AvailableModesMonitor(1)) for _ in range(258)))
     assert [f.sequence for f in frames] == [*range(256), 0, 1]
-    assert {(f.system, f.component) for f in frames} == {(1, 191)}
+    assert {f.ids for f in frames} == {(1, 191)}
 
 
 class NoMessage(NamedTuple):

@@ -56,7 +56,7 @@ def feed(*pieces: bytes) -> tuple[list[Frame], Counters]:
 def known_frames(data: bytes) -> list[tuple[Any, ...]]:
     """The same of our parser."""
     frames = [frame for frame in Parser(None).feed(data) if frame.message_id in CRC_EXTRA]
-    return [(f.message_id, f.system, f.component, f.sequence, f.payload) for f in frames]
+    return [(f.message_id, *f.ids, f.sequence, f.payload) for f in frames]
 
 
 def pymavlink_frames(data: bytes, dialect: Any = ardupilotmega) -> list[tuple[Any, ...]]:
@@ -75,13 +75,13 @@ def pymavlink_frames(data: bytes, dialect: Any = ardupilotmega) -> list[tuple[An
 
 def test_a_frame_is_cut_into_its_parts() -> None:
     (frame,), counters = feed(heartbeat(sequence=7, system=3, component=100))
-    assert frame == Frame(0, 3, 100, 7, HEARTBEAT, b"")
+    assert frame == Frame(0, (3, 100), 7, HEARTBEAT, b"")
     assert counters == Counters(frames=1)
 
 
 def test_mavlink_1_is_understood_and_counted() -> None:
     (frame,), counters = feed(heartbeat(sequence=7, system=3, component=100, version=1))
-    assert frame == Frame(0, 3, 100, 7, HEARTBEAT, b"")
+    assert frame == Frame(0, (3, 100), 7, HEARTBEAT, b"")
     assert counters == Counters(frames=1, frames_v1=1)
 
 
@@ -268,7 +268,7 @@ def test_a_parser_that_keeps_everything_gives_each_frame_as_it_came_also_unknown
     frames = parser.feed(b"".join(stream))
     assert [frame.raw for frame in frames] == stream
     assert [frame.message_id for frame in frames] == [0, UNKNOWN_ID, 30, UNKNOWN_ID, 0]
-    assert (frames[1].system, frames[1].component, frames[1].sequence, frames[1].payload) == (1, 1, 4, b"abc")
+    assert (*frames[1].ids, frames[1].sequence, frames[1].payload) == (1, 1, 4, b"abc")
     assert parser.counters == Counters(frames=3, frames_v1=1, unknown={UNKNOWN_ID: 2})
 
 
@@ -276,7 +276,7 @@ def test_an_unknown_frame_of_mavlink_1_is_kept_with_the_ids_of_its_header() -> N
     unknown = bytes([0xFE, 2, 9, 5, 6, 244, 1, 2, 3, 4])  # 244 is known; 237 is nobody's
     unknown = bytes([0xFE, 2, 9, 5, 6, 10, 1, 2, 3, 4])
     (frame, _) = Parser(None).feed(unknown + heartbeat())
-    assert frame == Frame(10, 5, 6, 9, None, unknown)
+    assert frame == Frame(10, (5, 6), 9, None, unknown)
     assert frame.payload == b"\x01\x02"
 
 

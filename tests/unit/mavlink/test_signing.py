@@ -38,7 +38,7 @@ def unsigned(sequence: int = 0, system: int = 1, component: int = 1, version: in
 
 
 def radio_status(message_id: int = 109) -> Frame:
-    return Frame(message_id, 51, 68, 0, None, b"")
+    return Frame(message_id, (51, 68), 0, None, b"")
 
 
 def signed(stamp: int, key: bytes = KEY, link_id: int = 0, system: int = 1, component: int = 1) -> bytes:
@@ -355,7 +355,7 @@ def test_no_bytes_raise(pieces: list[bytes], at: int, accept: str) -> None:
 @settings(max_examples=300, deadline=None)
 @given(st.binary(max_size=300), st.integers(0, 2**24 - 1))
 def test_no_frame_raises_and_none_is_verified_by_chance(raw: bytes, message_id: int) -> None:
-    assert verifier().judge(Frame(message_id, 1, 1, 0, None, raw), NOW) is not Verdict.VERIFIED
+    assert verifier().judge(Frame(message_id, (1, 1), 0, None, raw), NOW) is not Verdict.VERIFIED
 
 
 @settings(max_examples=200, deadline=None)

@@ -233,7 +233,7 @@ class Plant:
 
         `until` is handed to the hardware, see there.
         """
-        if self.hw.changed or any(map(self._may_start, self._idle)):
+        if self.hw.changed or (self._idle and any(map(self._may_start, self._idle))):
             return now
         return min(self.hw.next_due(until), self._service_due, self._posts_due)
 

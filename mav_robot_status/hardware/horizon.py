@@ -49,13 +49,12 @@ def _of_global_position(memory: Memory, options: HardwareOptions) -> tuple[objec
         moving.value,
         moving.value is UNKNOWN and moving.slow_since is None,
         moving.speed is None,
-        _may_contradict(memory) and speed_over_ground(memory) > options.v_on_disarmed,
+        # whether the receiver stands still while the estimate of a disarmed vehicle moves
+        moving.value is TRUE
+        and memory.gps_motion.value is FALSE
+        and not memory.pulse.armed
+        and speed_over_ground(memory) > options.v_on_disarmed,
     )
-
-
-def _may_contradict(memory: Memory) -> bool:
-    """Whether the receiver stands still while the estimate of a disarmed vehicle moves."""
-    return memory.motion.value is TRUE and memory.gps_motion.value is FALSE and not memory.pulse.armed
 
 
 def _of_local_position(memory: Memory, options: HardwareOptions) -> tuple[object, ...]:
@@ -192,6 +191,10 @@ def matters(memory: Memory, options: HardwareOptions) -> Matters:
     found: dict[type | None, tuple[object, ...]] = {kind: part(memory, options) for kind, part in PARTS.items()}
     found[None] = _of_the_rest(memory, options)
     return found
+
+
+UNLIKE_ALL: Final[Matters] = dict.fromkeys(PARTS, ("never",))
+"""Differs from whatever matters: every message then counts as one that changes something."""
 
 
 def next_change(memory: Memory, after: float, options: HardwareOptions) -> float:

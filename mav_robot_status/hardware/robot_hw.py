@@ -116,7 +116,7 @@ class MavlinkRobotHW(RobotHW):
         handler(memory, message, now, options)
         if tracked.dirty:
             return beating
-        if self._hasty or (
+        if (
             part(memory, options) != tracked.seen[type_]
             if part is not None
             else horizon.matters(memory, options) != tracked.seen
@@ -277,10 +277,13 @@ class MavlinkRobotHW(RobotHW):
 
     def _look_again(self, until: float) -> None:
         """Put off the deadlines up to `until` of vehicles of which what would have ended was heard again meanwhile."""
+        first = math.inf
         for tracked in self._tracked.values():
             if tracked.deadline <= until and tracked.memory is not None:
                 tracked.deadline = horizon.next_change(tracked.memory, tracked.checked, self.options)
-        self.deadline = min(tracked.deadline for tracked in self._tracked.values())
+            if tracked.deadline < first:
+                first = tracked.deadline
+        self.deadline = first
 
     def _evaluate(self, tracked: Tracked, now: Instant) -> None:
         if tracked.memory is None or tracked.ids is None:
@@ -303,7 +306,7 @@ class MavlinkRobotHW(RobotHW):
         handle.evidence = derived.evidence
         tracked.dirty = False
         tracked.checked = now.mono
-        tracked.seen = horizon.matters(memory, self.options)
+        tracked.seen = horizon.UNLIKE_ALL if self._hasty else horizon.matters(memory, self.options)
         lost = derived.detail.link is LinkState.LOST
         tracked.deadline = math.inf if lost else horizon.next_change(memory, now.mono, self.options)
 

@@ -144,13 +144,13 @@ def count(table: dict[int, int], message_id: int, number: int = 1) -> None:
     table[message_id] = table.get(message_id, 0) + number
 
 
-class _Known(dict["bytes | int", "tuple[int, int | None, Reader | None]"]):
+class _Known(dict["bytes | int", "tuple[int, tuple[int, Reader | None] | None]"]):
     """What CRC_EXTRA does to a CRC, and for the wanted ones the id and how the message is read; by the id as it stands
     in the frame (MAVLink 2: three bytes)."""
 
-    def __missing__(self, wire_id: bytes | int) -> tuple[int, None, None]:
+    def __missing__(self, wire_id: bytes | int) -> tuple[int, None]:
         """An id that cannot be checked: no CRC is negative, so that none is good."""
-        return -1, None, None
+        return -1, None
 
 
 @lru_cache(maxsize=8)
@@ -158,8 +158,8 @@ def known_ids(wanted: frozenset[int]) -> _Known:
     """All ids whose CRC_EXTRA is known."""
     known = _Known()
     for message_id, crc_extra in CRC_EXTRA.items():
-        reads = message_id in wanted
-        entry = MIRROR[crc_extra] << 8, message_id if reads else None, READERS.get(message_id)
+        reads = (message_id, READERS.get(message_id)) if message_id in wanted else None
+        entry = MIRROR[crc_extra] << 8, reads
         known[message_id.to_bytes(3, "little")] = known[message_id] = entry
     return known
 
@@ -260,7 +260,7 @@ class Parser:
                     following += 13
                 if following > limit:
                     break
-                effect, message_id, reader = known[wire_id]
+                effect, reads = known[wire_id]
                 if crc_hqx(mirrored[i:end], seed) ^ effect != BACK[mirrored[end + 1]] ^ mirrored[end]:
                     self._expect(speaker, upcoming)
                     doubtful = i
@@ -284,7 +284,8 @@ class Parser:
                         continue
                     self.counters.signed += 1
                 good += 1
-                if message_id is not None:
+                if reads is not None:
+                    message_id, reader = reads
                     if reader is None:
                         message = None
                     else:
@@ -380,7 +381,7 @@ class Parser:
         _, _, header, seed = FORMATS[data[i]]
         if i + header > size:
             return OPEN
-        effect, _, _ = self._known[data[i + 7 : i + 10] if header == 10 else data[i + 5]]
+        effect, _ = self._known[data[i + 7 : i + 10] if header == 10 else data[i + 5]]
         if effect < 0:
             return WRONG
         end = i + header + data[i + 1]

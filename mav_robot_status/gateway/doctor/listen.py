@@ -15,7 +15,7 @@ from ...hardware.kinds import WANTED_IDS
 from ...hardware.requests import COMMON, LOOK, wanted_of
 from ...link.url import parse
 from ...mavlink.component import LONELY_SYSTEM, Component
-from ...mavlink.framing import Parser
+from ...mavlink.framing import Frame, Parser
 from ..explain import NO_OUTPUT, explanation, silent
 from ..live import Live
 from ..plant import Plant
@@ -157,10 +157,13 @@ class _Whole(Recording):
     def overheard(self, collector: Collector) -> Iterator[Stamped]:
         """What the gateway wants of it; the collector hears all."""
         for stamped in self:
-            now, frame, new_segment = stamped
-            if frame is not None:
-                collector.take(frame, now)
-            yield stamped if frame is None or frame.message_id in WANTED_IDS else (now, None, new_segment)
+            now, values, new_segment = stamped
+            if values is None:
+                yield stamped
+                continue
+            frame = Frame(*values)
+            collector.take(frame, now)
+            yield stamped if frame.message_id in WANTED_IDS else (now, None, new_segment)
 
 
 def _read(config: Config, base: Findings) -> Findings:

@@ -43,9 +43,7 @@ def global_position(memory: Memory, message: mav.GlobalPositionInt, now: Instant
     vx, vy, vz = message.vx, message.vy, message.vz
     still = not (vx or vy or vz)
     nowhere = message.lat == 0 and message.lon == 0
-    speed = _speed(memory, vx / 100, vy / 100, vz / 100, still, nowhere)
-    if speed is not None and memory.stack is ARDUPILOT:
-        speed = _measured(memory, speed, vz / 100, nowhere, at, options)
+    speed = _speed(memory, vx / 100, vy / 100, vz / 100, still, nowhere, at, options)
     _moved(memory, memory.motion, speed, at, options)
 
 
@@ -58,9 +56,7 @@ def local_position(memory: Memory, message: mav.LocalPositionNed, now: Instant, 
     seen.local_position = heard(message, at, seen.local_position)
     if not is_fresh(seen.global_position, at, motion.FRESH):
         vx, vy, vz = message.vx, message.vy, message.vz
-        speed = _speed(memory, vx, vy, vz, not (vx or vy or vz))
-        if speed is not None and memory.stack is ARDUPILOT:
-            speed = _measured(memory, speed, vz, False, at, options)
+        speed = _speed(memory, vx, vy, vz, not (vx or vy or vz), False, at, options)
         _moved(memory, memory.motion, speed, at, options)
 
 
@@ -72,11 +68,9 @@ def vfr_hud(memory: Memory, message: mav.VfrHud, now: Instant, options: Hardware
     if is_fresh(seen.global_position, at, motion.FRESH) or is_fresh(seen.local_position, at, motion.FRESH):
         return
     still = message.groundspeed == 0  # whatever the climb, which comes from the barometer
-    speed = _speed(memory, message.groundspeed, 0.0, message.climb, still)
+    speed = _speed(memory, message.groundspeed, 0.0, message.climb, still, False, at, options)
     if speed is None:
         pass
-    elif memory.stack is ARDUPILOT:
-        speed = _measured(memory, speed, message.climb, False, at, options)
     elif memory.stack is PX4:
         speed = _if_fast(memory, speed, options)  # PX4 keeps the other two back while its estimate is not valid
     elif memory.stack is OTHER and still and memory.vehicle_type not in AIRCRAFT and _lacks_gps(memory):
@@ -119,7 +113,9 @@ def system_time(memory: Memory, message: mav.SystemTime, now: Instant, options: 
         rebooted(memory, memory.boot, now)
 
 
-def _speed(memory: Memory, x: float, y: float, z: float, still: bool, nowhere: bool = False) -> float | None:
+def _speed(
+    memory: Memory, x: float, y: float, z: float, still: bool, nowhere: bool, now: float, options: HardwareOptions
+) -> float | None:
     """Speed in m/s, None where the numbers mean that there is no estimate: `still` exactly zero, `nowhere` at 0, 0.
 
     ArduPilot sends exactly zero (and its last position) when it has none, and up to 6 m/s at rest while its estimator
@@ -127,15 +123,17 @@ def _speed(memory: Memory, x: float, y: float, z: float, still: bool, nowhere: b
     """
     if not math.isfinite(x + y + z):
         return None
+    speed = math.hypot(x, y) if memory.family is ROVER else math.hypot(x, y, z)
     status = memory.observation.sys_status
     if memory.stack is ARDUPILOT:
         if still and (nowhere or status is None or not sensors.estimate_is_healthy(status.message)):
             return None
         if not memory.pulse.armed and status is not None and sensors.estimate_is_faulty(status.message):
             return None
-    elif memory.stack is INAV and still and not _has_gps(status):
+        return _measured(memory, speed, z, nowhere, now, options)
+    if memory.stack is INAV and still and not _has_gps(status):
         return None
-    return math.hypot(x, y) if memory.family is ROVER else math.hypot(x, y, z)
+    return speed
 
 
 def _measured(

@@ -196,7 +196,7 @@ class Parser:
         self._format = FORMATS[V2]  # of the last frame: most streams have only one version, and often one speaker
         self._speaker = 0  # system and component << 8; nobody is 0.0
         self._upcoming: int | None = None  # the speaker's next sequence number
-        self._expected: dict[int, int] = {}  # that of the others
+        self._expected: dict[int, int | None] = {}  # that of all who are watched, of others than the speaker
         self._keep_all = wanted is None
         self._known = known_ids(frozenset(CRC_EXTRA if wanted is None else wanted))
 
@@ -228,7 +228,7 @@ class Parser:
         mirrored = data.translate(MIRROR)
         known = self._known
         version, unpack, header, seed = self._format
-        speaker, upcoming = self._speaker, self._upcoming
+        speaker, upcoming, expected = self._speaker, self._upcoming, self._expected
         ids = speaker & 255, speaker >> 8
         frames: list[Values] = []
         message: Any
@@ -262,10 +262,11 @@ class Parser:
                     break
                 effect, reads = known[wire_id]
                 if crc_hqx(mirrored[i:end], seed) ^ effect != BACK[mirrored[end + 1]] ^ mirrored[end]:
-                    self._expect(speaker, upcoming)
+                    if speaker in expected:
+                        expected[speaker] = upcoming
                     doubtful = i
                     i = self._doubt(data, mirrored, i, following)
-                    upcoming = self._expected.get(speaker)
+                    upcoming = expected.get(speaker)
                     if self._in_step and i > doubtful:
                         if self._keep_all and effect < 0 and i == following:
                             frames.append(_unchecked(data, doubtful, following - stamped))
@@ -274,9 +275,12 @@ class Parser:
                 before = i
                 i = following
                 if source != speaker:
-                    self._expect(speaker, upcoming)
-                    speaker, upcoming = source, self._expected.get(source)
-                    ids = source & 255, source >> 8
+                    if speaker in expected:
+                        expected[speaker] = upcoming
+                    upcoming = expected.get(source)
+                    if upcoming is None and len(expected) < MAX_SOURCES:
+                        expected[source] = None
+                    speaker, ids = source, (source & 255, source >> 8)
                 upcoming = NEXT[sequence] if sequence == upcoming else self._gap(upcoming, sequence)
                 if flags:
                     if flags != SIGNED:
@@ -307,11 +311,6 @@ class Parser:
         self.counters.frames_v1 += old + good - since if version == V1 else old
         return frames
 
-    def _expect(self, source: int, sequence: int | None) -> None:
-        """Remember the sequence number of a source's next frame while others speak."""
-        if sequence is not None and (source in self._expected or len(self._expected) < MAX_SOURCES):
-            self._expected[source] = sequence
-
     def _gap(self, expected: int | None, sequence: int) -> int:
         """Count the frames missing before this one; the first frame of a source only starts its count.
 
@@ -332,11 +331,8 @@ class Parser:
         a frame can start behind them; if they end the data while something inside may yet become a frame, more is
         awaited. Else the step is lost.
         """
-        if data[i] == V2:
-            message_id, sequence = int.from_bytes(data[i + 7 : i + 10], "little"), data[i + 4]
-            source = data[i + 5] | data[i + 6] << 8
-        else:
-            message_id, sequence, source = data[i + 5], data[i + 2], data[i + 3] | data[i + 4] << 8
+        _, _, sequence, source, wire_id = FORMATS[data[i]].unpack(data, i)
+        message_id = wire_id if isinstance(wire_id, int) else int.from_bytes(wire_id, "little")
         bad = message_id in CRC_EXTRA
         at_end = following >= len(data)
         inside, open_inside = self._find(data, mirrored, i + 1, following) if bad or at_end else (-1, -1)
@@ -367,12 +363,14 @@ class Parser:
     def _find(self, data: bytes, mirrored: bytes, start: int, stop: int) -> tuple[int, int]:
         """The first start of a good frame in a range, and before it the first that more data may make one; -1: none."""
         open_ = -1
-        for match in MAGIC.finditer(data, start, stop):
-            verdict = self._judge(data, mirrored, match.start())
+        while match := MAGIC.search(data, start, stop):
+            at = match.start()
+            verdict = self._judge(data, mirrored, at)
             if verdict == VALID:
-                return match.start(), open_
+                return at, open_
             if verdict == OPEN and open_ < 0:
-                open_ = match.start()
+                open_ = at
+            start = at + 1
         return -1, open_
 
     def _judge(self, data: bytes, mirrored: bytes, i: int) -> int:

@@ -144,24 +144,24 @@ def count(table: dict[int, int], message_id: int, number: int = 1) -> None:
     table[message_id] = table.get(message_id, 0) + number
 
 
-class _Known(dict["bytes | int", "tuple[int, tuple[int, Reader | None] | None]"]):
-    """What CRC_EXTRA does to a CRC, and for the wanted ones the id and how the message is read; by the id as it stands
-    in the frame (MAVLink 2: three bytes)."""
-
-    def __missing__(self, wire_id: bytes | int) -> tuple[int, None]:
-        """An id that cannot be checked: no CRC is negative, so that none is good."""
-        return -1, None
+Known = tuple[int, "tuple[int, Reader | None] | None"]
+"""What CRC_EXTRA does to a CRC, and for a wanted message its id and how it is read."""
+UNKNOWN: Final[Known] = -1, None
+"""An id that cannot be checked: no CRC is negative, so that none is good."""
 
 
 @lru_cache(maxsize=8)
-def known_ids(wanted: frozenset[int]) -> _Known:
-    """All ids whose CRC_EXTRA is known."""
-    known = _Known()
+def known_ids(wanted: frozenset[int]) -> dict[int, Any]:
+    """All ids whose CRC_EXTRA is known; by the magic byte, then by the id as it stands in the frame."""
+    known_v1 = [UNKNOWN] * 256
+    known_v2 = {}
     for message_id, crc_extra in CRC_EXTRA.items():
         reads = (message_id, READERS.get(message_id)) if message_id in wanted else None
         entry = MIRROR[crc_extra] << 8, reads
-        known[message_id.to_bytes(3, "little")] = known[message_id] = entry
-    return known
+        known_v2[message_id.to_bytes(3, "little")] = entry
+        if message_id < len(known_v1):
+            known_v1[message_id] = entry
+    return {V1: known_v1, V2: known_v2}
 
 
 class Parser:
@@ -226,8 +226,8 @@ class Parser:
             data = self._tail + data
         size = len(data)
         mirrored = data.translate(MIRROR)
-        known = self._known
         version, unpack, header, seed = self._format
+        known = self._known[version]
         speaker, upcoming, expected = self._speaker, self._upcoming, self._expected
         ids = speaker & 255, speaker >> 8
         frames: list[Values] = []
@@ -253,6 +253,7 @@ class Parser:
                         old += good - since
                     since = good
                     self._format = version, unpack, header, seed = FORMATS[data[i]]
+                    known = self._known[version]
                 length, flags, sequence, source, wire_id = unpack(data, i)
                 end = i + header + length
                 following = end + trailer
@@ -260,7 +261,10 @@ class Parser:
                     following += 13
                 if following > limit:
                     break
-                effect, reads = known[wire_id]
+                try:
+                    effect, reads = known[wire_id]
+                except KeyError:
+                    effect, reads = UNKNOWN
                 if crc_hqx(mirrored[i:end], seed) ^ effect != BACK[mirrored[end + 1]] ^ mirrored[end]:
                     if speaker in expected:
                         expected[speaker] = upcoming
@@ -376,14 +380,16 @@ class Parser:
     def _judge(self, data: bytes, mirrored: bytes, i: int) -> int:
         """VALID: a whole frame of a known id with a good CRC. OPEN: the data ends before that is certain."""
         size = len(data)
-        _, _, header, seed = FORMATS[data[i]]
+        version, unpack, header, seed = FORMATS[data[i]]
         if i + header > size:
             return OPEN
-        effect, _ = self._known[data[i + 7 : i + 10] if header == 10 else data[i + 5]]
+        length, flags, _, _, wire_id = unpack(data, i)
+        known = self._known[version]
+        effect, _ = known[wire_id] if version == V1 or wire_id in known else UNKNOWN
         if effect < 0:
             return WRONG
-        end = i + header + data[i + 1]
-        if end + (15 if header == 10 and data[i + 2] & SIGNED else 2) > size:
+        end = i + header + length
+        if end + (15 if flags and flags & SIGNED else 2) > size:
             return OPEN
         crc = crc_hqx(mirrored[i:end], seed) ^ effect
         return VALID if crc == BACK[mirrored[end + 1]] ^ mirrored[end] else WRONG

@@ -92,8 +92,9 @@ class MavlinkRobotHW(RobotHW):
     def take(self, frame: Values, now: Instant) -> Tracked | None:
         """Take one frame. Returns the vehicle whose autopilot's heartbeat it is, None for everything else."""
         message_id, ids, _, message, _, _ = frame
-        kind = KINDS.get(message_id)
-        if kind is None:
+        try:
+            type_, handler, part, moving = KINDS[message_id]
+        except KeyError:
             if message_id in COMMAND_IDS:
                 self._overhear(message, ids, now)
             return None
@@ -111,7 +112,6 @@ class MavlinkRobotHW(RobotHW):
             return beating
         if beating is None and tracked.requests is not None:
             self._asking.heard(tracked, message, message_id, now.mono)
-        type_, handler, part, moving = kind
         options = self.options
         handler(memory, message, now, options)
         if tracked.dirty:

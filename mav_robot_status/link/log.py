@@ -46,8 +46,8 @@ for good: what was known before is of another time.
 """
 
 
-Record = tuple[Any, ...]
-"""Something in a log: whatever it is, its last value is its stamp, microseconds since 1970 as the log says."""
+Record = tuple[Any, Any, Any, Any, Any, int]
+"""A frame in a log (`framing.Values`), of which nothing but its stamp matters here: the last one."""
 END = -1
 """In place of the stamp behind the end of a log."""
 _NEVER = -(1 << 63)
@@ -64,7 +64,7 @@ def timed(records: Iterable[Record], last: Callable[[], int], counts: Counts) ->
     stamp = 0
     record: Record | None = None
     for following in records:
-        next_stamp = following[-1]
+        next_stamp = following[5]
         # Nearly every record is neither before the last one nor after the next one.
         if stamp <= next_stamp <= limit:
             yield new(Instant, (mono + (stamp - segment) * 1e-6, stamp)), record, False

@@ -1,27 +1,37 @@
 import itertools
 import re
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_robot_status.errors import UsageError
-from mav_robot_status.link.log import BLOCK, DAY_US, END, SMALL_STEP_US, Counts, LogReader, Stamped, follows, timed
+from mav_robot_status.link.log import (
+    BLOCK,
+    DAY_US,
+    END,
+    SMALL_STEP_US,
+    Counts,
+    LogReader,
+    Record,
+    Stamped,
+    follows,
+    timed,
+)
 
 START = 1_700_000_000_000_000
 SECOND = 1_000_000
 
 
-class Record(NamedTuple):
-    stamp: int
+def record(stamp: int) -> Record:
+    return None, None, None, None, None, stamp
 
 
 def records(stamps: list[int], counts: Counts) -> list[Stamped]:
     """When each stamp was heard, with nothing behind the last one."""
-    found = list(itertools.islice(timed(map(Record, stamps), lambda: END, counts), len(stamps)))
-    assert [what.stamp for _, what, _ in found] == stamps
+    found = list(itertools.islice(timed(map(record, stamps), lambda: END, counts), len(stamps)))
+    assert [what[-1] for _, what, _ in found] == stamps
     return found
 
 

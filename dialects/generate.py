@@ -39,14 +39,14 @@ UPSTREAM_CRC_EXTRA = {
 
 # What the gateway reads or writes, and what the fake autopilot needs beside it.
 USED = (
-    "HEARTBEAT SYS_STATUS SYSTEM_TIME SET_MODE PARAM_REQUEST_READ PARAM_VALUE GPS_RAW_INT ATTITUDE LOCAL_POSITION_NED "
-    "GLOBAL_POSITION_INT SERVO_OUTPUT_RAW REQUEST_DATA_STREAM VFR_HUD COMMAND_INT COMMAND_LONG COMMAND_ACK "
-    "MESSAGE_INTERVAL EXTENDED_SYS_STATE NAMED_VALUE_INT STATUSTEXT ESC_STATUS EVENT AVAILABLE_MODES CURRENT_MODE "
-    "AVAILABLE_MODES_MONITOR EKF_STATUS_REPORT ESC_TELEMETRY_1_TO_4 ESC_TELEMETRY_5_TO_8 ESC_TELEMETRY_9_TO_12 "
-    "ROBOT_STATUS"
+    "HEARTBEAT SYS_STATUS SYSTEM_TIME SET_MODE PARAM_REQUEST_READ PARAM_VALUE GPS_RAW_INT ATTITUDE "
+    "LOCAL_POSITION_NED GLOBAL_POSITION_INT SERVO_OUTPUT_RAW REQUEST_DATA_STREAM VFR_HUD COMMAND_INT COMMAND_LONG "
+    "COMMAND_ACK AUTOPILOT_VERSION MESSAGE_INTERVAL EXTENDED_SYS_STATE NAMED_VALUE_INT STATUSTEXT ESC_STATUS EVENT "
+    "AVAILABLE_MODES CURRENT_MODE AVAILABLE_MODES_MONITOR EKF_STATUS_REPORT ESC_TELEMETRY_1_TO_4 "
+    "ESC_TELEMETRY_5_TO_8 ESC_TELEMETRY_9_TO_12 ROBOT_STATUS"
 ).split()
 
-# Fields that nobody reads of the messages that come most often; a frame that we write has zeros there.
+# Fields that nobody reads, of the messages that come most often or have many; a frame that we write has zeros there.
 UNREAD = {
     "SYS_STATUS": "load voltage_battery current_battery drop_rate_comm errors_comm errors_count3 errors_count4 "
     "battery_remaining",
@@ -58,6 +58,8 @@ UNREAD = {
     "VFR_HUD": "airspeed alt heading",
     "EKF_STATUS_REPORT": "velocity_variance pos_horiz_variance pos_vert_variance compass_variance terrain_alt_variance "
     "airspeed_variance",
+    "AUTOPILOT_VERSION": "capabilities uid middleware_sw_version os_sw_version board_version vendor_id product_id "
+    "flight_custom_version middleware_custom_version os_custom_version uid2",
 }
 
 # Enumerations whose names reach the user; the prefix is cut off.

@@ -2,7 +2,7 @@
 
 On ArduPilot an e-stop by RC switch or command changes neither HEARTBEAT nor, while armed, SYS_STATUS: an armed vehicle
 of which nothing more is heard is UNKNOWN. PX4 shows every stop as state FLIGHT_TERMINATION; before 1.12 it did not, and
-only said so.
+only said so: one that is known to be older (AUTOPILOT_VERSION) and says nothing is UNKNOWN.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ HONOURED_BY: Final = frozenset({Family.COPTER, Family.PLANE, Family.ROVER})
 command and driving on, and the others were never seen with one."""
 ARM_EMERGENCY_STOP: Final = 165
 """RCn_OPTION of a switch that stops in its low position, where it is parked: the pre-arm checks excuse that stop."""
+PX4_SHOWS: Final = 1, 12
+"""The first version of PX4 whose state shows a kill (PX4-Autopilot pull request 17709); the ones before only say so."""
 SETTLING: Final = 2.0
 """Seconds after a disarm, a connection or a word on the stop before a healthy PREARM_CHECK bit says anything: it is
 recomputed once a second, and forced healthy while armed."""

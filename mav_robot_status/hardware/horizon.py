@@ -151,6 +151,7 @@ def _of_the_rest(memory: Memory, options: HardwareOptions) -> tuple[object, ...]
         [(code, latch.text) for code, latch in memory.latches.items()],
         memory.failsafe,
         memory.modes,
+        memory.version,
         memory.assumed_free,
     )
 

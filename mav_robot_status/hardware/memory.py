@@ -61,6 +61,8 @@ class Memory:
     """RCn_OPTION by channel, as far as heard."""
     texts: statustext.Assembly = statustext.EMPTY
     modes: Mapping[int, AvailableMode] = field(default_factory=dict)
+    version: tuple[int, int] | None = None
+    """Of the autopilot's software, if it was heard: major, minor."""
     not_ready: Said | None = None
     """Why it cannot be armed."""
     failsafe: Said | None = None

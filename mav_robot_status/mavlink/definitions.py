@@ -186,6 +186,12 @@ class CommandAck(NamedTuple):
     target_component: int
 
 
+class AutopilotVersion(NamedTuple):
+    """AUTOPILOT_VERSION, id 148; fields in wire order, arrays as raw bytes."""
+
+    flight_sw_version: int
+
+
 class MessageInterval(NamedTuple):
     """MESSAGE_INTERVAL, id 244; fields in wire order, arrays as raw bytes."""
 
@@ -346,6 +352,7 @@ MESSAGES: Final[dict[int, Definition]] = {
     75: Definition(75, "COMMAND_INT", 35, Struct("<ffffiifHBBBBB"), CommandInt),
     76: Definition(76, "COMMAND_LONG", 33, Struct("<fffffffHBBB"), CommandLong),
     77: Definition(77, "COMMAND_ACK", 10, Struct("<HBBiBB"), CommandAck),
+    148: Definition(148, "AUTOPILOT_VERSION", 78, Struct("<16xI"), AutopilotVersion),
     244: Definition(244, "MESSAGE_INTERVAL", 6, Struct("<iH"), MessageInterval),
     245: Definition(245, "EXTENDED_SYS_STATE", 2, Struct("<BB"), ExtendedSysState),
     252: Definition(252, "NAMED_VALUE_INT", 18, Struct("<Ii10s"), NamedValueInt),

@@ -28,10 +28,16 @@ def e_stopped(view: View) -> Finding:
 
 def _px4_stop(view: View) -> Finding:
     if view.state != TERMINATED:
-        stop = view.memory.stop
-        if estop.still_said(stop, view.now) is TRUE:
+        stop, version = view.memory.stop, view.memory.version
+        told = estop.still_said(stop, view.now)
+        if told is TRUE:
             return TRUE, Evidence("the autopilot said so", stop.source, stop.last)
-        return FALSE, beat(view, "PX4 shows every stop as state FLIGHT_TERMINATION")
+        if version is None or version >= estop.PX4_SHOWS:
+            return FALSE, beat(view, "PX4 shows every stop as state FLIGHT_TERMINATION")
+        if told is FALSE:
+            return FALSE, Evidence("the autopilot said so", stop.source, stop.last)
+        source = f"AUTOPILOT_VERSION {version[0]}.{version[1]}"
+        return UNKNOWN, Evidence("PX4 before 1.12 shows a kill in words alone", source)
     if view.heartbeat.base_mode & HIL:
         return UNKNOWN, beat(view, "in hardware-in-the-loop older PX4 is always in lockdown")
     return TRUE, beat(view, "state FLIGHT_TERMINATION: kill, lockdown or termination")

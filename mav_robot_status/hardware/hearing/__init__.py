@@ -41,6 +41,7 @@ HANDLERS: Final[dict[type, Handler]] = {
     mav.CommandAck: commanded.command_ack,
     mav.CurrentMode: modes.current_mode,
     mav.AvailableModes: modes.available_modes,
+    mav.AutopilotVersion: modes.autopilot_version,
 }
 
 

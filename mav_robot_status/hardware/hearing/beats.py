@@ -95,6 +95,7 @@ def rebooted(memory: Memory, boot: boot_rules.Boot, now: Instant) -> None:
         watch=outputs.Watch(functions=memory.watch.functions),
         switches=memory.switches,
         modes=memory.modes,
+        version=memory.version,
         asked=memory.asked,
         boots=memory.boots + 1,
         formerly=memory.formerly,

@@ -1,11 +1,11 @@
-"""CURRENT_MODE and AVAILABLE_MODES."""
+"""What an autopilot says of itself: CURRENT_MODE, AVAILABLE_MODES, AUTOPILOT_VERSION."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
 from ...mavlink.decode import text
-from ...mavlink.definitions import AvailableModes, CurrentMode
+from ...mavlink.definitions import AutopilotVersion, AvailableModes, CurrentMode
 from ..flight_mode import AvailableMode
 from ..observation import heard
 
@@ -30,3 +30,10 @@ def available_modes(memory: Memory, message: AvailableModes, now: Instant, optio
     name = text(message.mode_name)
     mode = AvailableMode(name, message.standard_mode, message.properties)
     memory.modes = {**memory.modes, message.custom_mode: mode}
+
+
+def autopilot_version(memory: Memory, message: AutopilotVersion, now: Instant, options: HardwareOptions) -> None:
+    """AUTOPILOT_VERSION: the version of the software, which a build without a tag leaves at zero."""
+    version = message.flight_sw_version >> 16
+    if version:
+        memory.version = version >> 8, version & 0xFF

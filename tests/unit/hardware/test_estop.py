@@ -8,7 +8,7 @@ from mav_robot_status.hardware.identity import Stack
 from mav_robot_status.hardware.options import HardwareOptions
 from mav_robot_status.hardware.pulse import Pulse, first_beat
 from mav_robot_status.interface import TriState
-from mav_robot_status.mavlink.definitions import Heartbeat, ParamValue, SysStatus
+from mav_robot_status.mavlink.definitions import AutopilotVersion, Heartbeat, ParamValue, SysStatus
 
 from .driver import ACTIVE, FITTED, MOTORS, PREARM, STANDBY, TERMINATED, copter, px4
 
@@ -108,6 +108,10 @@ def test_a_stop_said_between_the_arming_and_its_heartbeat_stays() -> None:
     assert flight.status.e_stopped is TriState.TRUE
 
 
+def version(major: int, minor: int, patch: int) -> AutopilotVersion:
+    return AutopilotVersion(major << 24 | minor << 16 | patch << 8 | 255)
+
+
 KILL, RELEASED = "Manual kill-switch engaged", "Manual kill-switch disengaged"
 
 
@@ -119,6 +123,38 @@ def test_a_kill_that_an_old_px4_only_speaks_of_is_a_stop_until_it_says_otherwise
     flight.text(KILL, 0).hb(armed=False, state=STANDBY).wait(2)
     assert flight.status.e_stopped is TriState.TRUE
     assert flight.hb(armed=True, state=ACTIVE).status.e_stopped is TriState.FALSE
+
+
+@pytest.mark.parametrize("armed", [True, False])
+def test_a_px4_that_is_known_to_show_no_kill_is_not_called_free_unless_it_says_so(armed: bool) -> None:
+    flight = px4().hb(armed=armed, state=ACTIVE if armed else STANDBY)
+    assert flight.status.e_stopped is TriState.FALSE
+    assert flight.send(version(1, 11, 3)).status.e_stopped is TriState.UNKNOWN
+    why = flight.vehicle.handle.evidence["e_stopped"]
+    assert (why.rule, why.source) == ("PX4 before 1.12 shows a kill in words alone", "AUTOPILOT_VERSION 1.11")
+    assert flight.status.motion_possible is (TriState.TRUE if armed else TriState.FALSE)
+    assert flight.text(KILL, 0).status.e_stopped is TriState.TRUE
+    assert flight.text(RELEASED, 0).status.e_stopped is TriState.FALSE
+    assert flight.hb(state=TERMINATED).status.e_stopped is TriState.TRUE
+
+
+@pytest.mark.parametrize("message", [(1, 12, 0), (1, 17, 0), (2, 0, 0), (0, 0, 0)])
+def test_a_px4_of_a_version_that_shows_its_kill_or_of_none_that_it_tells_is_believed(
+    message: tuple[int, int, int],
+) -> None:
+    flight = px4().hb(armed=True, state=ACTIVE).send(version(*message))
+    assert flight.status.e_stopped is TriState.FALSE
+
+
+def test_the_version_of_an_autopilot_outlives_its_reboot_but_not_another_autopilot() -> None:
+    flight = px4()
+    flight.stream("system_time", flight.system_time)
+    flight.wait(3)
+    flight.send(version(1, 11, 3)).reboot().wait(5)
+    assert flight.vehicle.boots == 1
+    assert flight.status.e_stopped is TriState.UNKNOWN
+    flight.vehicle_type = 1
+    assert flight.hb().status.e_stopped is TriState.FALSE
 
 
 def test_a_px4_that_shows_its_stops_is_believed_on_what_it_shows() -> None:

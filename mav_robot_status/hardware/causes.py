@@ -88,6 +88,10 @@ NAMED_FAILSAFES: Final = frozenset({*range(2001, 2014), 3014, 3016, 3020, 3021, 
 NAMED_EMERGENCIES: Final = frozenset(range(4001, 4007))
 
 
+TERMINATING: Final = 1.5
+"""Seconds after the announcement of a termination in which a heartbeat may still be one from before it."""
+
+
 class Latch(NamedTuple):
     """A cause that was announced."""
 
@@ -101,6 +105,15 @@ class Latch(NamedTuple):
 
 Latches = Mapping[int, Latch]
 NO_LATCHES: Final[Latches] = {}
+
+
+def has_outlived_termination(latches: Latches, armed: bool, heard_at: float) -> bool:
+    """Whether a heartbeat shows that what was announced as a termination is a landing under power.
+
+    ArduPilot terminates by disarming in the same instant, or, if the site wants that (AFS_TERM_ACTION), by landing.
+    """
+    latch = latches.get(1002)
+    return latch is not None and armed and heard_at > latch.since.mono + TERMINATING
 
 
 def announce(latches: Latches, code: int, text: str | None, now: Instant, source: str | None = None) -> Latches:

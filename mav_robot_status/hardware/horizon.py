@@ -101,6 +101,7 @@ def _of_heartbeat(memory: Memory, options: HardwareOptions) -> tuple[object, ...
     return (
         seen and (seen.since, seen.message),
         memory.latches.keys(),
+        seen and causes.has_outlived_termination(memory.latches, memory.pulse.armed, seen.at),
         memory.observation.esc and outputs.is_at_stop(memory.watch, memory.vehicle_type),
     )
 

@@ -52,7 +52,7 @@ def _ardupilot_stop(view: View) -> Finding:
     if told is TRUE:
         return TRUE, Evidence("the autopilot said so", stop.source, stop.last)
     latches = causes.lasting(memory.latches, memory.pulse, now, view.options.text_hold_s)
-    if 1002 in latches:
+    if 1002 in latches and not causes.has_outlived_termination(latches, view.armed, view.heard_at):
         return TRUE, Evidence("termination announced", latches[1002].source, latches[1002].last)
     if view.state == TERMINATED:
         return TRUE, beat(view, "state FLIGHT_TERMINATION")

@@ -16,6 +16,7 @@ NOW = Instant(1000.0, 1_800_000_000_000_000)
 ALL = FITTED | PREARM
 READY = SysStatus._make((ALL, ALL, ALL, *[0] * 5))
 NOT_READY = READY._replace(onboard_control_sensors_health=FITTED)
+LAND = 9
 HIGH, PREARM_TEXT = "RC7: MotorEStop HIGH", "PreArm: Motors Emergency Stopped"
 
 
@@ -123,6 +124,21 @@ def test_a_kill_that_an_old_px4_only_speaks_of_is_a_stop_until_it_says_otherwise
     flight.text(KILL, 0).hb(armed=False, state=STANDBY).wait(2)
     assert flight.status.e_stopped is TriState.TRUE
     assert flight.hb(armed=True, state=ACTIVE).status.e_stopped is TriState.FALSE
+
+
+def test_a_copter_that_lands_under_power_instead_of_terminating_is_not_stopped() -> None:
+    flight = copter().hb(armed=True, state=ACTIVE)
+    flight.wait(5)
+    flight.text("Terminating due to fence breach", 2).wait(1)
+    assert flight.status.e_stopped is TriState.TRUE
+    *_, landing = flight.hb(mode=LAND).wait(2)
+    assert landing.e_stopped is TriState.UNKNOWN
+    assert landing.drives_powered is landing.motion_possible is TriState.TRUE
+    assert landing.error_code == 1002
+    *_, landing = flight.text("Terminating due to fence breach", 2).wait(1)
+    assert landing.drives_powered is TriState.TRUE
+    flight.hb(armed=False, state=STANDBY).wait(10)
+    assert flight.status.e_stopped is TriState.TRUE
 
 
 @pytest.mark.parametrize("armed", [True, False])

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from mav_robot_status.mavlink.definitions import CRC_EXTRA
 from mav_robot_status.mavlink.encode import with_crc
-from mav_robot_status.mavlink.framing import MIRROR
+from mav_robot_status.mavlink.wire import MIRROR
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

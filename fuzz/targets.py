@@ -16,8 +16,9 @@ from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
 from mav_robot_status.link.url import parse
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
 from mav_robot_status.mavlink.encode import enclose
-from mav_robot_status.mavlink.framing import MAX_FRAME, Frame, Parser
+from mav_robot_status.mavlink.framing import Frame, Parser
 from mav_robot_status.mavlink.signing import Signer, Verifier, is_signed
+from mav_robot_status.mavlink.wire import MAX_FRAME
 
 PIECE: Final = 97
 """Bytes fed at once: frames are cut everywhere."""

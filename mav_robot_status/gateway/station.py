@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 from ..hardware.kinds import WANTED_IDS
 from ..link import open_link
 from ..link.url import parse
-from ..mavlink.framing import Counters, Parser
+from ..mavlink.counters import Counters
+from ..mavlink.framing import Parser
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,7 +7,7 @@ from binascii import crc_hqx
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from .definitions import CRC_EXTRA, MESSAGES
-from .framing import MIRROR, V1, V2
+from .wire import MIRROR, V1, V2
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -4,75 +4,28 @@
 `definitions.CRC_EXTRA`; only wanted frames become values. It is either *in step*, where a header is believed
 far enough to skip a frame that cannot be checked, or *hunting*, where nothing but a whole frame with a good CRC counts.
 So a wrong length byte cannot swallow the good frames behind it, and no damaged frame is counted twice.
-The format: https://mavlink.io/en/guide/serialization.html.
 """
 
 from __future__ import annotations
 
-import re
 import struct
 from binascii import crc_hqx
-from dataclasses import dataclass, field
-from functools import lru_cache
-from struct import Struct
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from .decode import READERS
+from .counters import Counters, count
 from .definitions import CRC_EXTRA
+from .wire import BACK, FORMATS, MAGIC, MIRROR, SIGNED, STAMP, STAMP_SIZE, UNKNOWN, V1, V2, known_ids
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Collection
 
-    from .decode import Reader
-
-MAX_FRAME: Final = 280
-"""Bytes of the longest frame: header 10, payload 255, CRC 2, signature 13."""
 MAX_SOURCES: Final = 1024
 """So many (system, component) pairs are watched for lost frames; a further one only until another speaks."""
-MAX_IDS: Final = 256
-"""So many ids have a counter of their own in each table of `Counters`."""
-OTHER_IDS: Final = -1
-"""The key under which the ids beyond MAX_IDS are counted."""
 
-V1, V2 = 0xFE, 0xFD
-SIGNED = 0x01  # MAVLINK_IFLAG_SIGNED, the only incompatibility flag there is
 LATE = 240  # a gap this long is a frame that came up to 16 places late, or twice, rather than 240 lost ones
 NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; looking it up is quicker than counting
-STAMP = Struct(">Q").unpack_from  # microseconds since 1970
-STAMP_SIZE: Final = 8
-_IDS_V1 = b"".join(re.escape(bytes((message_id,))) for message_id in CRC_EXTRA if message_id < 256)
-_HIGH_V2 = b"".join(re.escape(bytes((high,))) for high in {message_id >> 16 for message_id in CRC_EXTRA})
-MAGIC = re.compile(b"\xfe(?=.{4}[%b]|.{0,4}\\Z)|\xfd(?=.{8}[%b]|.{0,8}\\Z)" % (_IDS_V1, _HIGH_V2), re.DOTALL)
-"""Where a frame of a known id may start, as far as the bytes behind it tell."""
 VALID, OPEN, WRONG = range(3)
 new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
-
-# MAVLink's CRC-16/MCRF4XX is the standard library's crc_hqx on bytes whose bits are mirrored.
-MIRROR: Final = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
-_STEPS: Final = {step & 255: high << 8 | step >> 8 for high in range(256) for step in (crc_hqx(bytes((high,)), 0),)}
-BACK: Final = tuple(_STEPS[low] for low in range(256))
-"""Undoes the last byte of a CRC, which is CRC_EXTRA and does not stand in the frame: looking up two bytes is quicker
-than adding that one. `before(extra) == BACK[crc & 255] ^ crc >> 8 ^ extra << 8`."""
-
-
-class Format(NamedTuple):
-    """How the frames of one version of MAVLink are read."""
-
-    magic: int
-    unpack: Callable[[bytes, int], tuple[Any, ...]]
-    """The header: length, incompatibility flags (version 1 has none: b""), sequence, system and component, id."""
-    header: int
-    """Bytes of it."""
-    seed: int
-    """Where the CRC starts, so that it is 0xFFFF behind the magic byte, which it does not span."""
-
-
-def _format(magic: int, header: str) -> Format:
-    layout = Struct(header)
-    return Format(magic, layout.unpack_from, layout.size, BACK[0xFF] ^ 0xFF ^ MIRROR[magic] << 8)
-
-
-FORMATS: Final = {V2: _format(V2, "<xBBxBH3s"), V1: _format(V1, "<xB0sBHB")}
 
 
 class Frame(NamedTuple):
@@ -101,67 +54,6 @@ class Frame(NamedTuple):
 
 Values = tuple[int, tuple[int, int], int, Any, bytes, int]
 """Those of a Frame, in a plain tuple: it is made and taken apart in a third of the time."""
-
-
-@dataclass(slots=True)
-class Counters:
-    """What came in, by kind; all counted since the parser was made."""
-
-    frames: int = 0
-    """Frames of known ids with a good CRC, wanted or not."""
-    frames_v1: int = 0
-    """Those of them in MAVLink 1."""
-    signed: int = 0
-    """Those of them with a signature, verified or not."""
-    lost: int = 0
-    """Frames missing from the sequence of their source. Modulo 256: an outage can hide multiples of 256."""
-    incompatible: int = 0
-    """Frames of known ids with a good CRC whose incompatibility flags have an unknown bit: not delivered."""
-    garbage_bytes: int = 0
-    """Bytes skipped in search of the next frame."""
-    bad_crc: dict[int, int] = field(default_factory=dict)
-    """By message id: damaged frames, and frames of a definition other than ours."""
-    unknown: dict[int, int] = field(default_factory=dict)
-    """By message id: frames whose CRC_EXTRA is not known, so that they cannot be checked."""
-
-    def add(self, other: Counters) -> None:
-        """Add what another parser counted."""
-        self.frames += other.frames
-        self.frames_v1 += other.frames_v1
-        self.signed += other.signed
-        self.lost += other.lost
-        self.incompatible += other.incompatible
-        self.garbage_bytes += other.garbage_bytes
-        for mine, theirs in ((self.bad_crc, other.bad_crc), (self.unknown, other.unknown)):
-            for message_id, number in theirs.items():
-                count(mine, message_id, number)
-
-
-def count(table: dict[int, int], message_id: int, number: int = 1) -> None:
-    """Add to the counter of an id, or to that of OTHER_IDS once the table is full."""
-    if message_id not in table and len(table) >= MAX_IDS:
-        message_id = OTHER_IDS
-    table[message_id] = table.get(message_id, 0) + number
-
-
-Known = tuple[int, "tuple[int, Reader | None] | None"]
-"""What CRC_EXTRA does to a CRC, and for a wanted message its id and how it is read."""
-UNKNOWN: Final[Known] = -1, None
-"""An id that cannot be checked: no CRC is negative, so that none is good."""
-
-
-@lru_cache(maxsize=8)
-def known_ids(wanted: frozenset[int]) -> dict[int, Any]:
-    """All ids whose CRC_EXTRA is known; by the magic byte, then by the id as it stands in the frame."""
-    known_v1 = [UNKNOWN] * 256
-    known_v2 = {}
-    for message_id, crc_extra in CRC_EXTRA.items():
-        reads = (message_id, READERS.get(message_id)) if message_id in wanted else None
-        entry = MIRROR[crc_extra] << 8, reads
-        known_v2[message_id.to_bytes(3, "little")] = entry
-        if message_id < len(known_v1):
-            known_v1[message_id] = entry
-    return {V1: known_v1, V2: known_v2}
 
 
 class Parser:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from .definitions import CRC_EXTRA
 from .encode import with_crc
-from .framing import MIRROR, SIGNED, V1, V2
+from .wire import MIRROR, SIGNED, V1, V2
 
 if TYPE_CHECKING:
     from .framing import Frame

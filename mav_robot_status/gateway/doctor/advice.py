@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...hardware.identity import AUTOPILOT_ARDUPILOT, AUTOPILOT_PX4
 from ...mavlink import definitions as mav
-from ...mavlink.framing import OTHER_IDS
+from ...mavlink.counters import OTHER_IDS
 from .findings import HEARTBEAT
 
 if TYPE_CHECKING:

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Final
 from ...hardware.fields.view import named
 from ...hardware.identity import is_autopilot
 from ...mavlink import definitions as mav
-from ...mavlink.framing import V1, Counters, Parser
-from ...mavlink.framing import count as add
+from ...mavlink.counters import Counters
+from ...mavlink.counters import count as add
+from ...mavlink.framing import Parser
+from ...mavlink.wire import V1
 from ..paths import APART, CLOCKS
 from .findings import HEARTBEAT, Speaker
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...hardware.fields.view import named
 from ...mavlink import definitions as mav
-from ...mavlink.framing import Counters
+from ...mavlink.counters import Counters
 
 if TYPE_CHECKING:
     from ...hardware.requests import Wanted

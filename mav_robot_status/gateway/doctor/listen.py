@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from ...hardware.tracked import Tracked
     from ...link.base import Link, Received
     from ...link.log import Stamped
-    from ...mavlink.framing import Counters
+    from ...mavlink.counters import Counters
     from .diagnosis import Diagnosis
 
 LISTEN: Final = 5.0

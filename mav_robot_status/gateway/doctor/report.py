@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ...hardware.fields.view import named
 from ...hardware.identity import AUTOPILOT_PX4
 from ...mavlink import definitions as mav
-from ...mavlink.framing import OTHER_IDS
+from ...mavlink.counters import OTHER_IDS
 from .advice import listed, named_all
 from .findings import GROUND_STATION
 

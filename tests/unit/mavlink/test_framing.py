@@ -13,13 +13,16 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
 from mav_robot_status.mavlink import pymavlink_dialect
+from mav_robot_status.mavlink.counters import MAX_IDS, OTHER_IDS, Counters
 from mav_robot_status.mavlink.definitions import CRC_EXTRA, MESSAGES, Attitude, Heartbeat, Statustext
 from mav_robot_status.mavlink.encode import Encoder, encode
-from mav_robot_status.mavlink.framing import MAX_FRAME, MAX_IDS, MAX_SOURCES, OTHER_IDS, Counters, Frame, Parser
+from mav_robot_status.mavlink.framing import MAX_SOURCES, Frame, Parser
+from mav_robot_status.mavlink.wire import MAX_FRAME
 
 RECORDINGS = sorted((pathlib.Path(__file__).parents[4] / "shared" / "recordings" / "sitl").glob("*.tlog"))
 HEARTBEAT = Heartbeat(custom_mode=4, type=2, autopilot=3, base_mode=209, system_status=4, mavlink_version=3)
 ATTITUDE = Attitude(1, 5.0, 6.0, 7.0)
+START = 1_700_000_000_000_000
 UNKNOWN_ID = 0x7A0001
 
 
@@ -356,10 +359,12 @@ def test_a_reset_starts_in_step() -> None:
     assert parser.counters.unknown == {UNKNOWN_ID: 1}
 
 
-def test_counters_add_up() -> None:
-    total = Counters(1, 2, 3, 4, 5, 6, {7: 8}, {9: 10})
-    total.add(Counters(10, 20, 30, 40, 50, 60, {7: 80, 8: 1}, {}))
-    assert total == Counters(11, 22, 33, 44, 55, 66, {7: 88, 8: 1}, {9: 10})
+def test_a_walk_gives_the_values_of_the_frames_with_their_stamps() -> None:
+    data = b"".join((START + n).to_bytes(8, "big") + heartbeat(n) for n in range(5))
+    walked = Parser({0}, stamped=True).walk(data)
+    assert {type(values) for values in walked} == {tuple}
+    assert [Frame(*values) for values in walked] == Parser({0}, stamped=True).feed(data)
+    assert [values[-1] for values in walked] == list(range(START, START + 5))
 
 
 hostile = st.lists(

@@ -13,7 +13,7 @@ from mav_robot_status.gateway.doctor.findings import Findings, Place, Speaker, T
 from mav_robot_status.gateway.doctor.report import as_text, remarks
 from mav_robot_status.hardware.requests import COMMON
 from mav_robot_status.link.url import parse
-from mav_robot_status.mavlink.framing import Counters
+from mav_robot_status.mavlink.counters import Counters
 
 STATUS = VehicleStatus("HOLD", {"mode": "MANUAL", "in_error": None, "in_motion": False}, (), ("DISARMED",), COMMON)
 ROVER = Speaker(1, 1, 3, 10, {0: 5, 1: 5, 33: 1}, {0: 1.0, 1: 1.0}, 11, pilot=True, status=STATUS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -115,13 +116,30 @@ def test_a_recording_of_the_large_set_replays_the_same_twice_and_within_the_inva
 
 
 @pytest.mark.skipif(not SCORE.exists(), reason="the large set of recordings is not beside this checkout")
-def test_the_large_set_has_nothing_wrong_missing_or_unknown_though_the_wire_tells() -> None:
+@pytest.mark.parametrize("output_watch", [True, False])
+def test_the_large_set_is_scored_as_the_document_says(output_watch: bool, tmp_path: pathlib.Path) -> None:
+    config = tmp_path / "config.yaml"
+    config.write_text(f"hardware: {{watch_outputs: {str(output_watch).lower()}}}\n")
     truths = sorted(str(path) for path in (SHARED / "sitl").glob("*.truth.json"))
-    command = f"{sys.executable} -m mav_robot_status.cli run -q {{log}} --rate 10"
+    command = f"{sys.executable} -m mav_robot_status.cli run -q --config {config} {{log}} --rate 10"
     done = subprocess.run(
         [sys.executable, str(SCORE), "--command", command, "--max-unknown", "0", *truths],
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    table = [line.split() for line in done.stdout.splitlines()[-10:]]
+    assert table[0][:7] == ["field", "n", "right", "honest", "unknown", "WRONG", "missing"], done.stdout + done.stderr
+    scored = {("all" if field == "TOTAL" else field): list(map(int, row[:6])) for field, *row in table[1:]}
+    document = (pathlib.Path(__file__).parents[2] / "docs" / "scoreboard.md").read_text()
+    rows = [[cell.strip(" `") for cell in row.split("|")[1:-1]] for row in re.findall(r"^\| .*$", document, re.M)]
+    documented = {row[0]: list(map(int, row[1:7])) for row in rows if len(row) == 8 and row[1].isdigit()}
+    unwatched = {row[0]: list(map(int, row[1:])) for row in rows if len(row) == 5 and row[1].isdigit()}
+    if output_watch:
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert scored == documented
+    else:
+        assert "all" in unwatched
+        for field, (n, right, honest, unknown, wrong, missing) in scored.items():
+            assert (unknown, missing) == (0, 0)
+            assert [n, right, honest, wrong] == unwatched.get(field, [*documented[field][:3], 0])

@@ -40,4 +40,4 @@ def rfc3339(unix_us: int) -> str:
 def _second(unix_s: int) -> str:
     if not FIRST_SECOND <= unix_s <= LAST_SECOND:  # a log may say anything
         unix_s = min(max(unix_s, FIRST_SECOND), LAST_SECOND)
-    return f"{datetime.fromtimestamp(unix_s, timezone.utc):%Y-%m-%dT%H:%M:%S}"
+    return datetime.fromtimestamp(unix_s, timezone.utc).isoformat()[:19]

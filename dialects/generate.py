@@ -130,7 +130,7 @@ def definitions(files: list[mavparse.MAVXML]) -> str:
     for name in USED:
         message = messages[name]
         out.append(f"class {class_name(name)}(NamedTuple):\n")
-        out.append(f'    """{name}, id {message.id}; fields in wire order, arrays as raw bytes."""\n\n')
+        out.append(f'    """{name}, id {message.id}; the known fields in wire order, arrays as raw bytes."""\n\n')
         known = known_fields(message)
         out += [f"    {f.name}: {field_code(f)[1]}{SHADOWS.get(f.name, '')}\n" for f in known]
         out.append("\n\n")

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
 
 Reader = tuple[type, int, "Callable[..., tuple[Any, ...]]"]
-"""How one kind of message is read: its type, the bytes of all its fields, and what unpacks the fields that are in a
-payload, from an offset on.
+"""How one kind of message is read: its type, the bytes up to the last field that we know, and what unpacks the known
+fields of a payload, from an offset on.
 
 A payload that MAVLink 2 trimmed, or that an older definition without the extension fields made shorter, is filled up
 with zeros before; bytes beyond the layout (a newer definition) are ignored. A plain tuple is taken apart in a third of

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 
 
 class Heartbeat(NamedTuple):
-    """HEARTBEAT, id 0; fields in wire order, arrays as raw bytes."""
+    """HEARTBEAT, id 0; the known fields in wire order, arrays as raw bytes."""
 
     custom_mode: int
     type: int
@@ -19,7 +19,7 @@ class Heartbeat(NamedTuple):
 
 
 class SysStatus(NamedTuple):
-    """SYS_STATUS, id 1; fields in wire order, arrays as raw bytes."""
+    """SYS_STATUS, id 1; the known fields in wire order, arrays as raw bytes."""
 
     onboard_control_sensors_present: int
     onboard_control_sensors_enabled: int
@@ -32,14 +32,14 @@ class SysStatus(NamedTuple):
 
 
 class SystemTime(NamedTuple):
-    """SYSTEM_TIME, id 2; fields in wire order, arrays as raw bytes."""
+    """SYSTEM_TIME, id 2; the known fields in wire order, arrays as raw bytes."""
 
     time_unix_usec: int
     time_boot_ms: int
 
 
 class SetMode(NamedTuple):
-    """SET_MODE, id 11; fields in wire order, arrays as raw bytes."""
+    """SET_MODE, id 11; the known fields in wire order, arrays as raw bytes."""
 
     custom_mode: int
     target_system: int
@@ -47,7 +47,7 @@ class SetMode(NamedTuple):
 
 
 class ParamRequestRead(NamedTuple):
-    """PARAM_REQUEST_READ, id 20; fields in wire order, arrays as raw bytes."""
+    """PARAM_REQUEST_READ, id 20; the known fields in wire order, arrays as raw bytes."""
 
     param_index: int
     target_system: int
@@ -56,7 +56,7 @@ class ParamRequestRead(NamedTuple):
 
 
 class ParamValue(NamedTuple):
-    """PARAM_VALUE, id 22; fields in wire order, arrays as raw bytes."""
+    """PARAM_VALUE, id 22; the known fields in wire order, arrays as raw bytes."""
 
     param_value: float
     param_count: int
@@ -66,14 +66,14 @@ class ParamValue(NamedTuple):
 
 
 class GpsRawInt(NamedTuple):
-    """GPS_RAW_INT, id 24; fields in wire order, arrays as raw bytes."""
+    """GPS_RAW_INT, id 24; the known fields in wire order, arrays as raw bytes."""
 
     vel: int
     fix_type: int
 
 
 class Attitude(NamedTuple):
-    """ATTITUDE, id 30; fields in wire order, arrays as raw bytes."""
+    """ATTITUDE, id 30; the known fields in wire order, arrays as raw bytes."""
 
     time_boot_ms: int
     rollspeed: float
@@ -82,7 +82,7 @@ class Attitude(NamedTuple):
 
 
 class LocalPositionNed(NamedTuple):
-    """LOCAL_POSITION_NED, id 32; fields in wire order, arrays as raw bytes."""
+    """LOCAL_POSITION_NED, id 32; the known fields in wire order, arrays as raw bytes."""
 
     time_boot_ms: int
     vx: float
@@ -91,7 +91,7 @@ class LocalPositionNed(NamedTuple):
 
 
 class GlobalPositionInt(NamedTuple):
-    """GLOBAL_POSITION_INT, id 33; fields in wire order, arrays as raw bytes."""
+    """GLOBAL_POSITION_INT, id 33; the known fields in wire order, arrays as raw bytes."""
 
     time_boot_ms: int
     lat: int
@@ -102,7 +102,7 @@ class GlobalPositionInt(NamedTuple):
 
 
 class ServoOutputRaw(NamedTuple):
-    """SERVO_OUTPUT_RAW, id 36; fields in wire order, arrays as raw bytes."""
+    """SERVO_OUTPUT_RAW, id 36; the known fields in wire order, arrays as raw bytes."""
 
     servo1_raw: int
     servo2_raw: int
@@ -124,7 +124,7 @@ class ServoOutputRaw(NamedTuple):
 
 
 class RequestDataStream(NamedTuple):
-    """REQUEST_DATA_STREAM, id 66; fields in wire order, arrays as raw bytes."""
+    """REQUEST_DATA_STREAM, id 66; the known fields in wire order, arrays as raw bytes."""
 
     req_message_rate: int
     target_system: int
@@ -134,7 +134,7 @@ class RequestDataStream(NamedTuple):
 
 
 class VfrHud(NamedTuple):
-    """VFR_HUD, id 74; fields in wire order, arrays as raw bytes."""
+    """VFR_HUD, id 74; the known fields in wire order, arrays as raw bytes."""
 
     groundspeed: float
     climb: float
@@ -142,7 +142,7 @@ class VfrHud(NamedTuple):
 
 
 class CommandInt(NamedTuple):
-    """COMMAND_INT, id 75; fields in wire order, arrays as raw bytes."""
+    """COMMAND_INT, id 75; the known fields in wire order, arrays as raw bytes."""
 
     param1: float
     param2: float
@@ -160,7 +160,7 @@ class CommandInt(NamedTuple):
 
 
 class CommandLong(NamedTuple):
-    """COMMAND_LONG, id 76; fields in wire order, arrays as raw bytes."""
+    """COMMAND_LONG, id 76; the known fields in wire order, arrays as raw bytes."""
 
     param1: float
     param2: float
@@ -176,7 +176,7 @@ class CommandLong(NamedTuple):
 
 
 class CommandAck(NamedTuple):
-    """COMMAND_ACK, id 77; fields in wire order, arrays as raw bytes."""
+    """COMMAND_ACK, id 77; the known fields in wire order, arrays as raw bytes."""
 
     command: int
     result: int
@@ -187,27 +187,27 @@ class CommandAck(NamedTuple):
 
 
 class AutopilotVersion(NamedTuple):
-    """AUTOPILOT_VERSION, id 148; fields in wire order, arrays as raw bytes."""
+    """AUTOPILOT_VERSION, id 148; the known fields in wire order, arrays as raw bytes."""
 
     flight_sw_version: int
 
 
 class MessageInterval(NamedTuple):
-    """MESSAGE_INTERVAL, id 244; fields in wire order, arrays as raw bytes."""
+    """MESSAGE_INTERVAL, id 244; the known fields in wire order, arrays as raw bytes."""
 
     interval_us: int
     message_id: int
 
 
 class ExtendedSysState(NamedTuple):
-    """EXTENDED_SYS_STATE, id 245; fields in wire order, arrays as raw bytes."""
+    """EXTENDED_SYS_STATE, id 245; the known fields in wire order, arrays as raw bytes."""
 
     vtol_state: int
     landed_state: int
 
 
 class NamedValueInt(NamedTuple):
-    """NAMED_VALUE_INT, id 252; fields in wire order, arrays as raw bytes."""
+    """NAMED_VALUE_INT, id 252; the known fields in wire order, arrays as raw bytes."""
 
     time_boot_ms: int
     value: int
@@ -215,7 +215,7 @@ class NamedValueInt(NamedTuple):
 
 
 class Statustext(NamedTuple):
-    """STATUSTEXT, id 253; fields in wire order, arrays as raw bytes."""
+    """STATUSTEXT, id 253; the known fields in wire order, arrays as raw bytes."""
 
     severity: int
     text: bytes
@@ -224,7 +224,7 @@ class Statustext(NamedTuple):
 
 
 class EscStatus(NamedTuple):
-    """ESC_STATUS, id 291; fields in wire order, arrays as raw bytes."""
+    """ESC_STATUS, id 291; the known fields in wire order, arrays as raw bytes."""
 
     time_usec: int
     rpm: bytes
@@ -234,7 +234,7 @@ class EscStatus(NamedTuple):
 
 
 class Event(NamedTuple):
-    """EVENT, id 410; fields in wire order, arrays as raw bytes."""
+    """EVENT, id 410; the known fields in wire order, arrays as raw bytes."""
 
     id: int
     event_time_boot_ms: int
@@ -246,7 +246,7 @@ class Event(NamedTuple):
 
 
 class AvailableModes(NamedTuple):
-    """AVAILABLE_MODES, id 435; fields in wire order, arrays as raw bytes."""
+    """AVAILABLE_MODES, id 435; the known fields in wire order, arrays as raw bytes."""
 
     custom_mode: int
     properties: int
@@ -257,7 +257,7 @@ class AvailableModes(NamedTuple):
 
 
 class CurrentMode(NamedTuple):
-    """CURRENT_MODE, id 436; fields in wire order, arrays as raw bytes."""
+    """CURRENT_MODE, id 436; the known fields in wire order, arrays as raw bytes."""
 
     custom_mode: int
     intended_custom_mode: int
@@ -265,19 +265,19 @@ class CurrentMode(NamedTuple):
 
 
 class AvailableModesMonitor(NamedTuple):
-    """AVAILABLE_MODES_MONITOR, id 437; fields in wire order, arrays as raw bytes."""
+    """AVAILABLE_MODES_MONITOR, id 437; the known fields in wire order, arrays as raw bytes."""
 
     seq: int
 
 
 class EkfStatusReport(NamedTuple):
-    """EKF_STATUS_REPORT, id 193; fields in wire order, arrays as raw bytes."""
+    """EKF_STATUS_REPORT, id 193; the known fields in wire order, arrays as raw bytes."""
 
     flags: int
 
 
 class EscTelemetry1To4(NamedTuple):
-    """ESC_TELEMETRY_1_TO_4, id 11030; fields in wire order, arrays as raw bytes."""
+    """ESC_TELEMETRY_1_TO_4, id 11030; the known fields in wire order, arrays as raw bytes."""
 
     voltage: bytes
     current: bytes
@@ -288,7 +288,7 @@ class EscTelemetry1To4(NamedTuple):
 
 
 class EscTelemetry5To8(NamedTuple):
-    """ESC_TELEMETRY_5_TO_8, id 11031; fields in wire order, arrays as raw bytes."""
+    """ESC_TELEMETRY_5_TO_8, id 11031; the known fields in wire order, arrays as raw bytes."""
 
     voltage: bytes
     current: bytes
@@ -299,7 +299,7 @@ class EscTelemetry5To8(NamedTuple):
 
 
 class EscTelemetry9To12(NamedTuple):
-    """ESC_TELEMETRY_9_TO_12, id 11032; fields in wire order, arrays as raw bytes."""
+    """ESC_TELEMETRY_9_TO_12, id 11032; the known fields in wire order, arrays as raw bytes."""
 
     voltage: bytes
     current: bytes
@@ -310,7 +310,7 @@ class EscTelemetry9To12(NamedTuple):
 
 
 class RobotStatus(NamedTuple):
-    """ROBOT_STATUS, id 59900; fields in wire order, arrays as raw bytes."""
+    """ROBOT_STATUS, id 59900; the known fields in wire order, arrays as raw bytes."""
 
     time_usec: int
     error_code: int

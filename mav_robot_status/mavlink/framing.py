@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from .counters import Counters, count
 from .definitions import CRC_EXTRA
-from .wire import BACK, FORMATS, MAGIC, MIRROR, SIGNED, STAMP, STAMP_SIZE, UNKNOWN, V1, V2, known_ids
+from .wire import BACK, FORMATS, MAGIC, MIRROR, SIGNED, UNKNOWN, V1, V2, known_ids
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
 MAX_SOURCES: Final = 1024
 """So many (system, component) pairs are watched for lost frames; a further one only until another speaks."""
-
+STAMP = struct.Struct(">Q").unpack_from  # before each frame of a recorded log: microseconds since 1970
+STAMP_SIZE: Final = 8
 LATE = 240  # a gap this long is a frame that came up to 16 places late, or twice, rather than 240 lost ones
 NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; looking it up is quicker than counting
 VALID, OPEN, WRONG = range(3)

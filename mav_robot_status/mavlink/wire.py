@@ -23,8 +23,6 @@ MAX_FRAME: Final = 280
 """Bytes of the longest frame: header 10, payload 255, CRC 2, signature 13."""
 V1, V2 = 0xFE, 0xFD
 SIGNED = 0x01  # MAVLINK_IFLAG_SIGNED, the only incompatibility flag there is
-STAMP = Struct(">Q").unpack_from  # microseconds since 1970
-STAMP_SIZE: Final = 8
 _IDS_V1 = b"".join(re.escape(bytes((message_id,))) for message_id in CRC_EXTRA if message_id < 256)
 _HIGH_V2 = b"".join(re.escape(bytes((high,))) for high in {message_id >> 16 for message_id in CRC_EXTRA})
 MAGIC = re.compile(b"\xfe(?=.{4}[%b]|.{0,4}\\Z)|\xfd(?=.{8}[%b]|.{0,8}\\Z)" % (_IDS_V1, _HIGH_V2), re.DOTALL)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from ...interface.status import Evidence
 from .. import causes, estop, motion, outputs, sensors
 from ..hearing.movement import driving_speed
 from ..identity import ARDUPILOT, HIL, PLANE, PX4
 from ..observation import is_fresh
 from .view import FALSE, TERMINATED, TRUE, UNKNOWN, Finding, View, beat
+
+ASSUMED: Final = Evidence("not stopped when armed, and no text since (estop_assume_visible)")
 
 
 def e_stopped(view: View) -> Finding:
@@ -36,6 +40,8 @@ def _px4_stop(view: View) -> Finding:
             return FALSE, beat(view, "PX4 shows every stop as state FLIGHT_TERMINATION")
         if told is FALSE:
             return FALSE, Evidence("the autopilot said so", stop.source, stop.last)
+        if _is_assumed_free(view):
+            return FALSE, ASSUMED
         source = f"AUTOPILOT_VERSION {version[0]}.{version[1]}"
         return UNKNOWN, Evidence("PX4 before 1.12 shows a kill in words alone", source)
     if view.heartbeat.base_mode & HIL:
@@ -71,9 +77,14 @@ def _ardupilot_stop(view: View) -> Finding:
         return FALSE, Evidence("the autopilot said so", stop.source, stop.last)
     if watched is FALSE:
         return FALSE, why
-    if view.armed and view.options.estop_assume_visible and memory.assumed_free:
-        return FALSE, Evidence("not stopped when armed, and no text since (estop_assume_visible)")
+    if _is_assumed_free(view):
+        return FALSE, ASSUMED
     return UNKNOWN, Evidence("ArduPilot does not show an emergency stop in HEARTBEAT, SYS_STATUS or texts alone")
+
+
+def _is_assumed_free(view: View) -> bool:
+    """Whether it was free when it was armed, at a site where every stop since would have been told."""
+    return view.armed and view.options.estop_assume_visible and view.memory.assumed_free
 
 
 def _watched(view: View) -> Finding:

@@ -154,6 +154,18 @@ def test_a_px4_that_is_known_to_show_no_kill_is_not_called_free_unless_it_says_s
     assert flight.hb(state=TERMINATED).status.e_stopped is TriState.TRUE
 
 
+@pytest.mark.parametrize(("told", "expected"), [(True, TriState.FALSE), (False, TriState.UNKNOWN)])
+def test_an_old_px4_that_was_free_when_it_was_armed_stays_so_where_every_stop_is_told(
+    told: bool, expected: TriState
+) -> None:
+    flight = px4(options=HardwareOptions(estop_assume_visible=True)).hb(state=STANDBY)
+    flight.send(version(1, 11, 3))
+    if told:
+        flight.text(KILL, 0).text(RELEASED, 0)
+    assert flight.hb(armed=True, state=ACTIVE).status.e_stopped is expected
+    assert flight.text(KILL, 0).status.e_stopped is TriState.TRUE
+
+
 @pytest.mark.parametrize("message", [(1, 12, 0), (1, 17, 0), (2, 0, 0), (0, 0, 0)])
 def test_a_px4_of_a_version_that_shows_its_kill_or_of_none_that_it_tells_is_believed(
     message: tuple[int, int, int],

@@ -1,1 +1,1 @@
-"""Measures the gateway beside others that read MAVLink, in one run on one machine: `python -m bench`."""
+"""Benchmarks of the gateway and of other MAVLink programs, in one run on one machine: `python -m bench`."""

@@ -1,4 +1,4 @@
-"""`python -m bench`: measure, and say beside each number what others need on the same machine in the same run."""
+"""`python -m bench`: run the benchmarks and compare with other programs on the same machine, in the same run."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ CASES: Final[dict[str, Case]] = {
     module.CASE.name: module.CASE
     for module in (parse, replay, udp, saturate, forward, latency, memory, start, vehicles, signed)
 }
-"""In the order in which they are measured."""
+"""The cases, in the order of a round."""
 ROUNDS: Final = 3
 PLACES: Final = {MAVPROXY: "MAVPROXY", MAVSDK: "MAVSDK_PYTHON", ROUTER: "MAVLINK_ROUTERD"}
-"""Peer -> environment variable with its path."""
+"""Program -> environment variable with its path."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -41,18 +41,18 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help=f"rounds; medians are shown ({ROUNDS})")
     made.add_argument("--quick", action="store_true", help="a quarter of the time for everything")
     made.add_argument("--long", action="store_true", help="memory: ten million frames")
-    made.add_argument("--log", type=Path, metavar="FILE", help="replay this recorded log too")
-    made.add_argument("--out", type=Path, metavar="DIR", help="write results.json and results.md there")
-    made.add_argument("--list", action="store_true", help="say what would be measured, and stop")
+    made.add_argument("--log", type=Path, metavar="FILE", help="also replay this recorded log")
+    made.add_argument("--out", type=Path, metavar="DIR", help="write results.json and results.md to this folder")
+    made.add_argument("--list", action="store_true", help="list the cases and exit")
     for peer, variable in PLACES.items():
         option = "--mavsdk-python" if peer == MAVSDK else f"--{peer.lower()}"
         made.add_argument(option, dest=variable, default=os.environ.get(variable), metavar="PATH",
-                          help=f"where {peer} is, if it is not found by itself; or ${variable}")  # fmt: skip
+                          help=f"path of {peer} if it is not on the PATH; or ${variable}")  # fmt: skip
     return made
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure what was asked for."""
+    """Run the selected cases."""
     options = parser().parse_args(arguments)
     cases = [CASES[name] for name in CASES if not options.only or name in options.only]
     if options.list:
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(bench: Bench, cases: list[Case], rounds: int) -> list[dict[str, Any]]:
-    """Every case once a round, so that a machine that is busy for a while spoils no case altogether."""
+    """Run every case once in each round, so that a short load does not affect all samples of one case."""
     found: dict[str, list[list[Sample | Skip]]] = {case.name: [] for case in cases}
     for number in range(1, rounds + 1):
         for case in cases:
@@ -94,8 +94,8 @@ def _round(bench: Bench, case: Case) -> list[Sample | Skip]:
     found: list[Sample | Skip] = []
     try:
         for item in case.measure(bench):
-            found.append(item)  # one by one: what was measured before an error is kept
-    except (BenchError, OSError) as error:  # a process has ended; the other cases are still worth having
+            found.append(item)  # one by one: the samples before an error stay
+    except (BenchError, OSError) as error:  # a process has ended; the other cases still run
         found.append(Skip(case.title, OURS, str(error)))
     return found
 

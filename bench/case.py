@@ -1,4 +1,4 @@
-"""What a case is, and what it gets to work with."""
+"""The interface of a case, and the settings of a run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class Bench:
     quick: bool = False
     long: bool = False
     log: Path | None = None
-    """A recorded log of the person's own."""
+    """A recorded log of the user."""
 
     def lasting(self, seconds: float) -> float:
-        """So long, or a quarter of it in a quick run."""
+        """The duration in seconds; a quarter of it in a quick run."""
         return seconds / 4 if self.quick else seconds
 
     def frames(self, vehicles: int = 1) -> Path:
-        """The frames of so many vehicles, for a sender."""
+        """A file with the frames of this many vehicles, for a sender."""
         path = self.place / f"fleet-{vehicles}.frames"
         if not path.exists():
             workload.save(path, workload.fleet(vehicles))
@@ -40,7 +40,7 @@ Found = Iterator[Sample | Skip]
 
 
 class Case(NamedTuple):
-    """One thing that is measured."""
+    """One benchmark."""
 
     name: str
     title: str

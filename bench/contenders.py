@@ -1,4 +1,4 @@
-"""Those that are measured: how each is started, and why one is not there."""
+"""The measured programs: how each starts, and why one is missing."""
 
 from __future__ import annotations
 
@@ -24,15 +24,17 @@ PROGRAMS: Final = {MAVPROXY: "mavproxy.py", ROUTER: "mavlink-routerd"}
 
 
 class Missing(Exception):  # noqa: N818  # a fact, not an error
-    """A contender is not there; the text says why."""
+    """A program is missing; the text says why."""
 
 
 class Contenders:
-    """Everyone who can be started on this machine. `paths`: where those are that are not on the PATH."""
+    """The programs on this machine. `paths`: the paths of programs that are not on the PATH."""
 
     def __init__(self, place: Path, paths: dict[str, str]) -> None:
         self._place = place
-        self._void = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)  # for those who must forward: nobody reads it
+        self._void = socket.socket(
+            socket.AF_INET, socket.SOCK_DGRAM
+        )  # a target for programs that must forward; nothing reads it
         self._void.bind(("127.0.0.1", 0))
         self._paths = paths
         self._options = subprocess.run(
@@ -40,7 +42,7 @@ class Contenders:
         ).stdout
 
     def close(self) -> None:
-        """Let go of what is open."""
+        """Close the socket."""
         self._void.close()
 
     @staticmethod
@@ -50,7 +52,7 @@ class Contenders:
         return [*([found] if found else [sys.executable, "-m", "mav_robot_status.cli"]), *arguments]
 
     def has_option(self, option: str) -> bool:
-        """Whether our command has it."""
+        """Whether our command has this option."""
         return f"{option} " in self._options or f"{option}]" in self._options
 
     def start_ours(self, port: int, *arguments: str, pipe: bool = False) -> Child:
@@ -62,7 +64,7 @@ class Contenders:
         return Child([sys.executable, str(PEERS / "pymavlink_status.py"), str(port), *arguments], pipe=pipe)
 
     def start(self, who: str, port: int) -> Child:
-        """Anyone that turns UDP into something, with what is its default. Raises Missing."""
+        """A program that reads UDP, with its default options. Raises Missing."""
         if who == OURS:
             return self.start_ours(port)
         if who == COALESCING:
@@ -76,10 +78,10 @@ class Contenders:
         return self.start_forwarding(who, port, int(self._void.getsockname()[1]))
 
     def start_forwarding(self, who: str, port: int, out: int) -> Child:
-        """Anyone that forwards, from one UDP port to another. Raises Missing."""
+        """A program that forwards from one UDP port to another. Raises Missing."""
         if who == OURS:
             if not self.has_option("--forward"):
-                raise Missing("this version has no option --forward")
+                raise Missing("this version lacks the option --forward")
             return self.start_ours(port, "--forward", "--out", f"udpout:127.0.0.1:{out}", "--json", "none")
         if who == PYMAVLINK:
             return Child([sys.executable, str(PEERS / "pymavlink_forward.py"), str(port), str(out)])
@@ -95,12 +97,12 @@ class Contenders:
         )  # fmt: skip
 
     def path(self, who: str) -> str:
-        """Of a program. Raises Missing."""
+        """The path of a program. Raises Missing."""
         program = PROGRAMS[who]
         wanted = self._paths.get(who, program)
         found = _which(wanted)
         if not found:
-            raise Missing(f"there is no program {wanted}")
+            raise Missing(f"the program {wanted} is not installed")
         return found
 
     def _mavsdk(self) -> str:
@@ -110,7 +112,7 @@ class Contenders:
         return python
 
     def each(self, who: tuple[str, ...], skipped: list[Skip]) -> Iterator[str]:
-        """Those that are there; the others are written down as skipped."""
+        """The programs that are installed; the others are recorded as skipped."""
         for name in who:
             try:
                 if name in PROGRAMS:
@@ -123,28 +125,28 @@ class Contenders:
                 yield name
 
     def versions(self) -> dict[str, str]:
-        """Of the peers that are programs or live in another Python."""
+        """The versions of the programs outside this Python."""
         found: dict[str, str] = {}
         for name in (MAVPROXY, ROUTER):
             try:
                 found[name] = _version([self.path(name), "--version"])
             except Missing:
-                found[name] = "not there"
+                found[name] = "not installed"
         try:
             code = "from importlib.metadata import version as v; print(v('mavsdk'))"
             found[MAVSDK] = _version([self._mavsdk(), "-c", code])
         except Missing:
-            found[MAVSDK] = "not there"
+            found[MAVSDK] = "not installed"
         return found
 
 
 def _which(program: str) -> str | None:
-    """Where a program is: in this Python's environment, or on the PATH."""
+    """The path of a program in the environment of this Python, or on the PATH."""
     return shutil.which(program, path=os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", ""))))
 
 
 def _version(command: list[str]) -> str:
-    """The first thing in what a program says that looks like a version."""
+    """The first version number in the output of a program."""
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, cwd=ROOT)
     except (OSError, subprocess.TimeoutExpired) as error:

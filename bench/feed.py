@@ -1,4 +1,4 @@
-"""Traffic for a process that is measured, and its CPU time while it gets it."""
+"""Traffic for a process, and the CPU time that the process uses for it."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PACE = 0.97
-"""A sender that reached less of the rate that it was told was at its limit."""
-SETTLE = 0.2  # s between the warm-up and what is measured
+"""A sender below this fraction of the requested rate was at its limit."""
+SETTLE = 0.2  # s between the warm-up and the measurement
 
 
 class Fed(NamedTuple):
-    """What a process did with some traffic."""
+    """The result of one measurement."""
 
     sent: int
     lost: int
-    """Datagrams that found no room in the socket's queue, or were not read in time."""
+    """Datagrams that the kernel dropped because the queue was full, or that the process did not read in time."""
     seconds: float
     cpu: float
     """Seconds of CPU time."""
-    asked: int
-    """Frames a second that the sender was told to send."""
+    requested: int
+    """The requested rate in frames a second."""
     behind: float = 0.0
-    """Seconds that it went on reading when nothing was sent any more."""
+    """Seconds until the process has read all frames, after the last one was sent."""
 
     @property
     def rate(self) -> float:
@@ -38,24 +38,24 @@ class Fed(NamedTuple):
 
     @property
     def per_frame(self) -> float:
-        """CPU time for each frame that was read, microseconds."""
+        """CPU time per frame, in microseconds."""
         return self.cpu * 1e6 / max(1, self.sent - self.lost)
 
     @property
     def share(self) -> float:
-        """Per cent of a core."""
+        """CPU load in per cent of a core."""
         return 100 * self.cpu / self.seconds
 
     @property
     def slow_sender(self) -> bool:
-        """Whether the sender could not do what it was told."""
-        return self.rate < PACE * self.asked
+        """Whether the sender did not reach the requested rate."""
+        return self.rate < PACE * self.requested
 
     @property
     def note(self) -> str:
-        """What one has to know to believe the value."""
+        """A remark that limits the value; empty if there is none."""
         lost = f"{100 * self.lost / self.sent:.1f} % of the frames were lost" if self.lost else ""
-        slow = f"the sender reached {self.rate:,.0f} frames/s only" if self.slow_sender else ""
+        slow = f"the sender reached only {self.rate:,.0f} frames/s" if self.slow_sender else ""
         return ", ".join(text for text in (lost, slow) if text)
 
 
@@ -80,11 +80,11 @@ class Feed:
 
     def raw(self, data: bytes) -> None:
         """Send one datagram."""
-        self._tell(f"raw {data.hex()}")
+        self._command(f"raw {data.hex()}")
 
     def send(self, rate: int, seconds: float) -> tuple[int, float]:
-        """Send; how many frames, and how many seconds it took."""
-        self._tell(f"{rate} {seconds}")
+        """Send. Return the number of frames and the seconds that this took."""
+        self._command(f"{rate} {seconds}")
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
@@ -94,7 +94,7 @@ class Feed:
         return int(sent), float(took)
 
     def measure(self, child: Child, rate: int, seconds: float) -> Fed:
-        """The child's CPU time while it gets traffic, until it has read everything."""
+        """The CPU time of the child from the first frame until it has read all of them."""
         dropped_before, cpu_before = self._dropped(), child.cpu()
         sent, took = self.send(rate, seconds)
         ended = time.perf_counter()
@@ -104,7 +104,7 @@ class Feed:
         return Fed(sent, lost if complete else max(lost, 1), took, child.cpu() - cpu_before, rate, behind)
 
     def warm_up(self, rate: int = 800, seconds: float = 1.0) -> None:
-        """Traffic before what is measured: connections are made, caches filled."""
+        """Traffic before the measurement: opens connections and fills caches."""
         self.send(rate, seconds)
         drained(self._port)
         time.sleep(SETTLE)
@@ -113,7 +113,7 @@ class Feed:
         found = queue(self._port)
         return found.dropped if found else 0
 
-    def _tell(self, line: str) -> None:
+    def _command(self, line: str) -> None:
         assert self._process.stdin is not None
         self._process.stdin.write(line + "\n")
         self._process.stdin.flush()

@@ -1,7 +1,7 @@
-"""A guard against slower code that looks at no clock: bytecode instructions, counted, against committed numbers.
+"""Detects slower code without a clock: counts bytecode instructions and compares them with committed numbers.
 
-`python -m bench.guard` compares, `--update` writes the numbers of this Python anew. An instruction counts wherever it
-runs, in the standard library too, so that work which only moves is still seen; the inside of C code is not.
+`python -m bench.guard` compares, `--update` writes the numbers of this Python. Instructions of the standard library
+count too, so work that only moves still counts. Instructions inside C code do not.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.config import Config, LinkConfig
-from mav_robot_status.gateway.live import Live
-from mav_robot_status.hardware.kinds import WANTED_IDS
-from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
+from mav_robot_status.gateway.event_loop import EventLoop
+from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.mavlink.framing import Parser
 
 from . import workload
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 BASELINE: Final = Path(__file__).with_name("baseline.json")
 TOLERANCE: Final = 0.05
-"""How much more is still the same: patch releases of Python compile a little differently."""
+"""Patch releases of Python compile a little differently."""
 THIS_PYTHON: Final = f"{sys.version_info.major}.{sys.version_info.minor}"
 START: Final = Instant(1000.0, 1_800_000_000_000_000)
 FRAMES: Final = 1600
@@ -39,7 +39,7 @@ TURNS: Final = 20
 
 
 class Verdict(NamedTuple):
-    """One number against its baseline: what is new has 0, and so has to be put into the baseline."""
+    """One number and its baseline. A new number has the baseline 0, and fails until its baseline is committed."""
 
     name: str
     counted: float
@@ -47,7 +47,7 @@ class Verdict(NamedTuple):
 
     @property
     def worse(self) -> bool:
-        """Whether it is more than the tolerance allows."""
+        """Whether the number exceeds the baseline by more than the tolerance."""
         return self.counted > self.baseline * (1 + TOLERANCE)
 
     def __str__(self) -> str:
@@ -56,14 +56,14 @@ class Verdict(NamedTuple):
         return f"{self.name:<48}{self.counted:>10.1f}{self.baseline:>10.1f}  {mark}"
 
 
-# what is counted: each gives what to run, and how many of its unit that is
+# the counted calls: each returns the function to run and the number of units of one run
 
 Work = tuple["Callable[[], object]", int]
 
 
 @contextmanager
 def parse_stream() -> Iterator[Work]:
-    """Parsing a stream that is read in pieces."""
+    """Parse a stream that is read in pieces."""
     pieces = workload.chunks(workload.frames(FRAMES))
     parser = Parser(WANTED_IDS)
     yield lambda: [parser.feed(piece) for piece in pieces], FRAMES
@@ -71,7 +71,7 @@ def parse_stream() -> Iterator[Work]:
 
 @contextmanager
 def parse_datagrams() -> Iterator[Work]:
-    """Parsing one frame at a time."""
+    """Parse one frame at a time."""
     pieces = workload.frames(FRAMES)
     parser = Parser(WANTED_IDS)
     yield lambda: [parser.feed(piece) for piece in pieces], FRAMES
@@ -79,7 +79,7 @@ def parse_datagrams() -> Iterator[Work]:
 
 @contextmanager
 def take() -> Iterator[Work]:
-    """Taking the frames that a status needs."""
+    """Process the frames that a status needs."""
     frames = Parser(WANTED_IDS).feed(b"".join(workload.frames(FRAMES)))
     hw = MavlinkRobotHW()
     yield lambda: [hw.take(frame, later(START, i / 9.2)) for i, frame in enumerate(frames)], len(frames)
@@ -87,9 +87,9 @@ def take() -> Iterator[Work]:
 
 @contextmanager
 def wake_ups() -> Iterator[Work]:
-    """Turns of the live loop, each with one datagram, at 400 a second: each is read on its own."""
+    """Turns of the event loop, each with one datagram, at 400 a second."""
     sent = 0
-    with _live(lambda: later(START, sent / 400)) as (live, send):
+    with _gateway(lambda: later(START, sent / 400)) as (gateway, send):
         left = iter(workload.frames(FRAMES))
 
         def until() -> bool:
@@ -100,67 +100,67 @@ def wake_ups() -> Iterator[Work]:
                 sent += 1
             return piece is None
 
-        yield lambda: live.run(until), FRAMES
+        yield lambda: gateway.run(until), FRAMES
 
 
 @contextmanager
 def idle_turns() -> Iterator[Work]:
-    """Turns in which there is nothing to do."""
-    with _hearing() as (live, now):
-        yield lambda: _turns(live, now, 1e-6), TURNS
+    """Turns of the event loop without work."""
+    with _with_vehicle() as (gateway, now):
+        yield lambda: _turns(gateway, now, 1e-6), TURNS
 
 
 @contextmanager
 def publications() -> Iterator[Work]:
-    """Turns in which a JSON line is due, and now and then a heartbeat of ours and ROBOT_STATUS."""
-    with _hearing() as (live, now):
-        yield lambda: _turns(live, now, 0.101), TURNS
+    """Turns in which a JSON line is due, and sometimes our HEARTBEAT and ROBOT_STATUS."""
+    with _with_vehicle() as (gateway, now):
+        yield lambda: _turns(gateway, now, 0.101), TURNS
 
 
 COUNTED: Final[dict[str, Callable[[], AbstractContextManager[Work]]]] = {
     "Parser.feed, 1400 bytes: per frame": parse_stream,
     "Parser.feed, a datagram: per frame": parse_datagrams,
     "MavlinkRobotHW.take: per frame that is needed": take,
-    "Live.run: per turn with a datagram": wake_ups,
-    "Live.turn: nothing to do": idle_turns,
-    "Live.turn: statuses at 10 Hz": publications,
+    "EventLoop.run: per turn with a datagram": wake_ups,
+    "EventLoop.turn: nothing to do": idle_turns,
+    "EventLoop.turn: statuses at 10 Hz": publications,
 }
 
 
 @contextmanager
-def _live(clock: Callable[[], Instant]) -> Iterator[tuple[Live, Callable[[bytes], object]]]:
-    """A gateway with a clock of our own, and how to send it a datagram."""
+def _gateway(clock: Callable[[], Instant]) -> Iterator[tuple[EventLoop, Callable[[bytes], object]]]:
+    """A gateway with a manual clock, and a function that sends it a datagram."""
     with open(os.devnull, "w") as nowhere, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        live = Live(Config(links=(LinkConfig("udpin:127.0.0.1:0"),)), nowhere, clock)
+        gateway = EventLoop(Config(links=(LinkConfig("udpin:127.0.0.1:0"),)), nowhere, clock)
         try:
-            link: Any = live.stations[0].link
+            link: Any = gateway.endpoints[0].link
             out.connect(("127.0.0.1", link.port))
-            yield live, out.send
+            yield gateway, out.send
         finally:
-            live.close()
+            gateway.close()
 
 
 @contextmanager
-def _hearing() -> Iterator[tuple[Live, Instant]]:
-    """A gateway with a vehicle whose messages of some seconds it has heard, and the time now."""
-    with _live(lambda: START) as (live, _):
+def _with_vehicle() -> Iterator[tuple[EventLoop, Instant]]:
+    """A gateway that has received messages of one vehicle for some minutes, and the current time."""
+    with _gateway(lambda: START) as (gateway, _):
         for i, frame in enumerate(Parser(WANTED_IDS).feed(b"".join(workload.frames(FRAMES)))):
             now = later(START, i / 9.2)
-            live.plant.take(frame, now)
-        live.turn(now)
-        yield live, now
+            gateway.hardware.mavlink.vehicles.take(frame, now)
+        gateway.turn(now)
+        yield gateway, now
 
 
-def _turns(live: Live, now: Instant, step: float) -> None:
+def _turns(gateway: EventLoop, now: Instant, step: float) -> None:
     for i in range(TURNS):
-        live.turn(later(now, (i + 1) * step))
+        gateway.turn(later(now, (i + 1) * step))
 
 
 # counting
 
 
 def measure() -> dict[str, float]:
-    """Every number of this Python."""
+    """All numbers for this version of Python."""
     logging.disable(logging.CRITICAL)
     try:
         return {name: round(_per_unit(make), 1) for name, make in COUNTED.items()}
@@ -169,7 +169,7 @@ def measure() -> dict[str, float]:
 
 
 def _per_unit(make: Callable[[], AbstractContextManager[Work]]) -> float:
-    with make() as (run, _):  # once for the caches
+    with make() as (run, _):  # fills the caches
         run()
     with make() as (run, units):
         return count(run, without=__file__) / units
@@ -179,18 +179,18 @@ def _per_unit(make: Callable[[], AbstractContextManager[Work]]) -> float:
 
 
 def baselines() -> dict[str, dict[str, float]]:
-    """The committed numbers, by Python."""
+    """The committed numbers, by version of Python."""
     found: dict[str, dict[str, float]] = json.loads(BASELINE.read_text()) if BASELINE.exists() else {}
     return found
 
 
 def compare(counted: dict[str, float], baseline: dict[str, float]) -> list[Verdict]:
-    """Each number beside its baseline."""
+    """A table of all numbers and baselines."""
     return [Verdict(name, value, baseline.get(name, 0.0)) for name, value in counted.items()]
 
 
 def main() -> int:
-    """0: nothing needs more than it did; 1: something does."""
+    """Return 0 if every number is within the tolerance, else 1."""
     parser = argparse.ArgumentParser(prog="python -m bench.guard", description=__doc__)
     parser.add_argument("--update", action="store_true", help="write the numbers of this Python as the baseline")
     options = parser.parse_args()
@@ -200,7 +200,7 @@ def main() -> int:
         committed[THIS_PYTHON] = counted
         BASELINE.write_text(json.dumps(dict(sorted(committed.items())), indent=2) + "\n")
     if THIS_PYTHON not in committed:
-        print(f"there is no baseline for Python {THIS_PYTHON}; --update writes one")
+        print(f"no baseline for Python {THIS_PYTHON}; --update writes one")
         return 0
     verdicts = compare(counted, committed[THIS_PYTHON])
     print(f"{'instructions, Python ' + THIS_PYTHON:<48}{'now':>10}{'baseline':>10}")

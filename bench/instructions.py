@@ -1,4 +1,4 @@
-"""Counts executed bytecode instructions: a measure of work that is the same at every run."""
+"""Counts executed bytecode instructions: a measure of work that is the same in every run."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     from types import CodeType, FrameType
 
 TOOL: Final = 4
-"""An identity for sys.monitoring that no debugger, profiler or coverage tool has."""
+"""A tool id of sys.monitoring that no debugger, profiler or coverage tool uses."""
 
 
 def count(run: Callable[[], object], without: str = "") -> int:
-    """The bytecode instructions of a call, in every function but those of the file `without`."""
+    """The number of bytecode instructions of a call, without those in functions of the file `without`."""
     gc.collect()
-    gc.disable()  # finalizers and callbacks would run whenever it likes
+    gc.disable()  # otherwise finalizers and callbacks run at random times
     try:
         return _monitored(run, without) if sys.version_info >= (3, 12) else _traced(run, without)
     finally:
@@ -62,7 +62,7 @@ def _monitored(run: Callable[[], object], without: str) -> int:
     monitoring.use_tool_id(TOOL, "bench")
     try:
         monitoring.register_callback(TOOL, event, instruction)
-        monitoring.restart_events()  # what an earlier count left out
+        monitoring.restart_events()  # events that an earlier count has disabled
         monitoring.set_events(TOOL, event)
         run()
     finally:

@@ -1,4 +1,4 @@
-"""What the numbers were measured on and with."""
+"""The machine and the versions of a run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PACKAGES: Final = ("pymavlink", "fastcrc")
 
 
 def machine() -> dict[str, Any]:
-    """CPU, cores, kernel, Python, and how busy it was."""
+    """CPU, cores, kernel, Python and load."""
     found = re.search(r"(?:model name|Model)\s*: (.*)", Path("/proc/cpuinfo").read_text())
     return {
         "cpu": found[1] if found else platform.machine(),
@@ -29,7 +29,7 @@ def machine() -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Ours, and those of the Python packages; of programs there is only the path."""
+    """The versions of our package and of the other Python packages."""
     found = {"mav-robot-status": mav_robot_status.__version__}
     for name in PACKAGES:
         try:

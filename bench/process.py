@@ -1,4 +1,4 @@
-"""Child processes and what the kernel knows of them: CPU time, memory, the queue of a UDP socket."""
+"""Child processes and their kernel statistics: CPU time, memory, the queue of a UDP socket."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ PATIENCE = 20.0  # s for a process to start or to end
 
 
 class BenchError(Exception):
-    """Something that is measured does not do what it should."""
+    """A measured program fails."""
 
 
 class Child:
-    """A process that is measured. As a context manager it is ended for sure."""
+    """A measured process. As a context manager it always ends the process."""
 
     def __init__(self, command: Sequence[str], *, pipe: bool = False, env: dict[str, str] | None = None) -> None:
-        """Start it. `pipe`: its standard output is read here, else nobody's."""
+        """Start it. `pipe`: the caller reads its standard output; else it is discarded."""
         self._log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  # closed with the child
         self.process: subprocess.Popen[bytes] = subprocess.Popen(
             list(command),
@@ -48,7 +48,7 @@ class Child:
         self._log.close()
 
     def cpu(self) -> float:
-        """Seconds of CPU time of all its threads so far, exact to nanoseconds: its CPU-time clock."""
+        """Seconds of CPU time of all its threads so far, from its CPU-time clock (nanosecond resolution)."""
         return time.clock_gettime((~self.process.pid << 3) | 2)
 
     def memory(self) -> float:
@@ -57,7 +57,7 @@ class Child:
         return int(found[1]) / 1024 if found else 0.0
 
     def stop(self) -> str:
-        """End it; what it wrote to standard error."""
+        """End it, and return its standard error."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -68,7 +68,7 @@ class Child:
         return self._log.read().decode("utf-8", "replace")
 
     def listens(self, port: int) -> None:
-        """Wait until it has the UDP port. Raises BenchError if that does not happen."""
+        """Wait until it has bound the UDP port. Raises BenchError on timeout."""
         deadline = time.monotonic() + PATIENCE
         while queue(port) is None:
             if self.process.poll() is not None or time.monotonic() > deadline:
@@ -80,13 +80,13 @@ class Queue(NamedTuple):
     """The receiving side of a UDP socket."""
 
     waiting: int
-    """Bytes that were not read yet."""
+    """Bytes that wait in the queue."""
     dropped: int
-    """Datagrams that found no room, since the socket was opened."""
+    """Datagrams dropped since the socket was opened, because the queue was full."""
 
 
 def queue(port: int) -> Queue | None:
-    """Of the socket bound to this port; None if there is none."""
+    """The queue of the socket that is bound to this port; None if no socket is."""
     for table in ("/proc/net/udp", "/proc/net/udp6"):
         with contextlib.suppress(OSError):
             for line in Path(table).read_text().splitlines()[1:]:
@@ -97,7 +97,7 @@ def queue(port: int) -> Queue | None:
 
 
 def drained(port: int, patience: float = 2.0) -> bool:
-    """Wait until everything that was sent to a port is read; False if that takes too long."""
+    """Wait until the queue of a port is empty; False on timeout."""
     deadline = time.monotonic() + patience
     while time.monotonic() < deadline:
         found = queue(port)
@@ -108,7 +108,7 @@ def drained(port: int, patience: float = 2.0) -> bool:
 
 
 def free_port() -> int:
-    """A UDP port that nobody has."""
+    """A free UDP port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_port:
         any_port.bind(("127.0.0.1", 0))
         return int(any_port.getsockname()[1])

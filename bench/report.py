@@ -30,11 +30,11 @@ def render(result: dict[str, Any]) -> str:
 
 
 def into(page: str, table: str) -> str:
-    """The page with the table between its marks. Raises ValueError if it has none."""
+    """The page with the table between its marks. Raises ValueError if the page has no marks."""
     before, begin, rest = page.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise ValueError(f"the page has no lines {BEGIN.strip()} and {END.strip()}")
+        raise ValueError(f"the page lacks the lines {BEGIN.strip()} and {END.strip()}")
     return f"{before}{begin}{table}{end}{after}"
 
 
@@ -68,7 +68,7 @@ def _case(case: dict[str, Any]) -> str:
 
 
 def _boards(case: dict[str, Any]) -> str:
-    """What slower computers would need, by nothing but ratios; of rates where nobody is near the limit of a core."""
+    """Estimates for slower computers: the CPU load times a factor. Only rates at which no program nears a full core."""
     rows = []
     for row in case["rows"]:
         rate = re.fullmatch(r"(\d+) frames/s", row["setup"])
@@ -87,7 +87,7 @@ def _paired(mine: list[float] | None, theirs: list[float] | None) -> str:
 
 
 def _ratio(value: float) -> str:
-    """A factor that a person can read: 0.083 is 1/12."""
+    """A readable factor: 0.083 becomes 1/12."""
     return f"{value:.3g}x" if value >= 0.4 or value <= 0 else f"1/{1 / value:.3g}"
 
 

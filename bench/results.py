@@ -1,4 +1,4 @@
-"""What a run gives: samples, medians of them, and whether targets are met. All values; nothing here measures."""
+"""The results of a run as values: samples, their medians, and whether the targets are met."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ class Sample(NamedTuple):
     """One measured value of one round."""
 
     setup: str
-    """What was done, in words; the rows of the table."""
+    """The setup, in words: a row of the table."""
     metric: str
-    """What was measured, with its unit."""
+    """The measured quantity with its unit."""
     who: str
     value: float
     note: str = ""
-    """What has to be known to believe it, as "the sender was at its limit"."""
+    """A remark that limits the value, such as "the sender was at its limit"."""
 
 
 class Skip(NamedTuple):
-    """Something that could not be measured."""
+    """A measurement that was not possible."""
 
     setup: str
     who: str
@@ -34,7 +34,7 @@ class Skip(NamedTuple):
 
 
 class Target(NamedTuple):
-    """What is to be reached in one setup: a factor of a peer's value, or an absolute one."""
+    """The target of one setup: a factor of the value of another program, or an absolute value."""
 
     setup: str
     metric: str
@@ -75,7 +75,7 @@ def _row(key: Key, values: dict[str, dict[int, float]]) -> dict[str, Any]:
 
 
 def _judged(target: Target, rows: dict[Key, dict[str, dict[int, float]]]) -> dict[str, Any]:
-    """The value that the target limits, the median over the rounds; None where there is nothing to compare."""
+    """A target with its value, the median over the rounds; the value is None if the run has nothing to compare."""
     row = rows.get((target.setup, target.metric), {})
     mine, theirs = row.get(target.who, {}), row.get(target.peer or "", {})
     if target.peer is not None:

@@ -1,8 +1,8 @@
-"""Sends frames to a UDP port, one a datagram, as told on standard input; a process of its own on a core of its own.
+"""A process with its own core that sends frames to a UDP port, one a datagram. Standard input has the commands.
 
 Lines in: `RATE SECONDS` (frames a second, over and over) or `raw HEX`. Line out: frames sent and seconds taken.
-Slow rates are one system call a frame at absolute deadlines. At fast ones sendmmsg sends some at a time, or Python
-would be the bottleneck.
+At slow rates each frame is one system call at an absolute deadline. At fast rates sendmmsg sends several frames at
+once; otherwise Python would be the bottleneck.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import sys
 import time
 from pathlib import Path
 
-FAST = 20_000  # frames a second above which some are sent at a time
-STEPS = 4000  # system calls a second then
-MOST = 64  # frames a system call
-SLEEP = 0.0006  # s: what remains after a sleep is waited for in a loop
+FAST = 20_000  # above this rate in frames a second one system call sends several
+STEPS = 4000  # system calls a second at such a rate
+MOST = 64  # the most frames of one system call
+SLEEP = 0.0006  # s; the rest of a wait is a busy loop
 
 
 class _Piece(ctypes.Structure):
@@ -42,7 +42,7 @@ class _Header(ctypes.Structure):
 
 
 class Sender:
-    """Frames that are sent over and over to one port."""
+    """Frames that are sent in a loop to one port."""
 
     def __init__(self, frames: list[bytes], port: int) -> None:
         self._frames = frames
@@ -61,7 +61,7 @@ class Sender:
             self._socket.send(data)
 
     def run(self, rate: int, seconds: float) -> tuple[int, float]:
-        """Send for a while; how many frames, and how long it took."""
+        """Send for `seconds`. Return the number of frames and the seconds that this took."""
         total = round(rate * seconds)
         batch = 1 if rate <= FAST else min(MOST, max(1, rate // STEPS))
         if batch > 1 and self._headers is None:
@@ -79,7 +79,7 @@ class Sender:
         return sent, time.perf_counter() - start
 
     def _one(self) -> int:
-        with contextlib.suppress(OSError):  # nobody is there yet
+        with contextlib.suppress(OSError):  # the receiver does not listen yet
             self._socket.send(self._frames[self._next])
         self._next = (self._next + 1) % len(self._frames)
         return 1
@@ -108,7 +108,7 @@ def _headers(frames: list[bytes]) -> ctypes.Array[_Header]:
 
 
 def main() -> None:
-    """Serve the lines of standard input."""
+    """Execute the commands on standard input."""
     from .workload import load
 
     cores = sorted(os.sched_getaffinity(0))

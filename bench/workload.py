@@ -1,7 +1,7 @@
-"""The traffic of the bench: one vehicle at the stream rates of a ground station, the same bytes at every run.
+"""The traffic of the benchmarks: one vehicle at the stream rates of a ground station, the same bytes in every run.
 
-80 frames a second of 26 kinds, 36 bytes on average, MAVLink 2; 16.5 % of the frames are of kinds that a status needs.
-Made with pymavlink, so that nothing of ours decides what a right frame is.
+80 frames a second of 26 message types, 36 bytes on average, MAVLink 2. A status needs 16.5 % of the frames. pymavlink
+encodes them, so that our own code does not decide what a valid frame is.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from mav_robot_status.mavlink.definitions import CRC_EXTRA
 from mav_robot_status.mavlink.encode import with_crc
-from mav_robot_status.mavlink.wire import MIRROR
+from mav_robot_status.mavlink.wire import REVERSED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,26 +24,26 @@ if TYPE_CHECKING:
 RATE: Final = 80
 """Frames a second of one vehicle."""
 PATTERN: Final = 800
-"""Frames until the kinds repeat: ten seconds."""
+"""Frames until the pattern of messages repeats: ten seconds."""
 LOOP: Final = 6400
-"""Frames that may be sent over and over: whole patterns, and the sequence number comes out even."""
+"""Frames of one loop: whole patterns, and a multiple of 256 for the sequence numbers."""
 SHORT_LOOP: Final = 1280
 """The same for one of many vehicles, to save memory: whole seconds."""
 BOOT_MS: Final = 600_000
 STILL_MS: Final = 1500
-"""How far the boot clock gets within a loop: when the loop starts again that must not look like a reboot."""
+"""Milliseconds by which the boot clock advances within a loop. A new loop must not look like a reboot."""
 
 SENT: Final[dict[str, int]] = {
     # a status needs these
     "heartbeat": 10, "sys_status": 10, "system_time": 10, "gps_raw_int": 10, "attitude": 10,
     "global_position_int": 10, "vfr_hud": 10, "servo_output_raw": 20, "ekf_status_report": 40, "statustext": 2,
-    # and these only pass by
+    # a status does not need these
     "raw_imu": 50, "scaled_imu2": 50, "scaled_imu3": 50, "scaled_pressure": 50, "scaled_pressure2": 40,
     "power_status": 50, "meminfo": 50, "nav_controller_output": 40, "mission_current": 48, "rc_channels": 20,
     "ahrs": 40, "ahrs2": 40, "vibration": 50, "battery_status": 20, "terrain_report": 20,
     "position_target_global_int": 50,
 }  # fmt: skip
-"""Kind of message -> how often in ten seconds."""
+"""Name of a message -> how often it is sent in ten seconds."""
 
 FIXED: Final[dict[str, dict[str, Any]]] = {
     "heartbeat": {"type": 2, "autopilot": 3, "base_mode": 217, "custom_mode": 3, "system_status": 4,
@@ -55,12 +55,12 @@ FIXED: Final[dict[str, dict[str, Any]]] = {
                    "onboard_control_sensors_health_extended": 0},
     "gps_raw_int": {"fix_type": 6},
     "global_position_int": {"vx": 500, "vy": 100, "vz": 0},
-    "ekf_status_report": {"flags": 831},  # all is measured
+    "ekf_status_report": {"flags": 831},  # all estimates
     "vfr_hud": {"airspeed": 5.0, "groundspeed": 5.0, "throttle": 40},
     "statustext": {"severity": 6, "text": b"EKF3 IMU0 is using GPS", "id": 0, "chunk_seq": 0},
     "servo_output_raw": {"port": 0, "servo1_raw": 1500, "servo2_raw": 1510, "servo3_raw": 1490, "servo4_raw": 1505},
 }  # fmt: skip
-"""Fields that decide a status: armed, in AUTO, driving, healthy; so it stays the same."""
+"""The fields that determine the status: armed, AUTO, driving, healthy. So the status never changes."""
 RANGES: Final = {
     "uint8_t": (0, 100), "int8_t": (0, 100), "char": (0, 0), "uint16_t": (0, 2000), "int16_t": (-1000, 1000),
     "uint32_t": (0, 100_000), "int32_t": (-100_000, 100_000), "uint64_t": (1, 1 << 50), "int64_t": (1, 1 << 50),
@@ -68,9 +68,9 @@ RANGES: Final = {
 
 
 def frames(count: int = LOOP, step_ms: float = STILL_MS / LOOP, key: bytes | None = None) -> list[bytes]:
-    """The first `count` frames; the boot clock goes on by `step_ms` with each. `key` (32 bytes): they are signed.
+    """The first `count` frames; each advances the boot clock by `step_ms`. With a `key` (32 bytes) they are signed.
 
-    Signed frames carry the present time and cannot be sent twice.
+    Signed frames contain the current time. A receiver accepts them only once.
     """
     mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
     if key is not None:
@@ -87,19 +87,19 @@ def frames(count: int = LOOP, step_ms: float = STILL_MS / LOOP, key: bytes | Non
 
 
 def fleet(vehicles: int) -> list[bytes]:
-    """Frames of many vehicles that take turns, to be sent over and over; for one vehicle those of `frames`."""
+    """A loop of frames of many vehicles in turn; for one vehicle the frames of `frames`."""
     one = frames(LOOP if vehicles == 1 else SHORT_LOOP)
     return [_of_system(frame, system) for frame in one for system in range(1, vehicles + 1)]
 
 
 def chunks(made: list[bytes], size: int = 1400) -> list[bytes]:
-    """The frames as a stream that is read in pieces."""
+    """The frames as a stream, cut into pieces of `size` bytes."""
     stream = b"".join(made)
     return [stream[i : i + size] for i in range(0, len(stream), size)]
 
 
 def write_log(path: Path, count: int) -> None:
-    """Write a recorded log: before each frame the time at which it came."""
+    """Write a recorded log."""
     start = 1_800_000_000_000_000
     with path.open("wb") as log:
         for i, frame in enumerate(frames(count, step_ms=1000 / RATE)):
@@ -107,12 +107,12 @@ def write_log(path: Path, count: int) -> None:
 
 
 def save(path: Path, made: list[bytes]) -> None:
-    """Write frames for a child program: each with its length in two bytes before it."""
+    """Write frames for a child program. The length of each frame, in two bytes, precedes it."""
     path.write_bytes(b"".join(struct.pack("<H", len(frame)) + frame for frame in made))
 
 
 def load(path: Path) -> Iterator[bytes]:
-    """The frames that `save` wrote."""
+    """Read the frames that `save` has written."""
     data = path.read_bytes()
     at = 0
     while at < len(data):
@@ -122,7 +122,7 @@ def load(path: Path) -> Iterator[bytes]:
 
 
 def _order() -> list[str]:
-    """The kinds of ten seconds, each spread evenly."""
+    """The names of the messages of ten seconds. Each type is evenly spread."""
     slots = [((i + 0.5) / number, kind) for kind, number in SENT.items() for i in range(number)]
     return [kind for _, kind in sorted(slots)]
 
@@ -131,7 +131,7 @@ def _message(kind: str, boot_ms: int, chance: random.Random) -> Any:
     made = getattr(dialect, f"MAVLink_{kind}_message")
     fixed = FIXED.get(kind, {})
     values = []
-    lengths = [made.array_lengths[order] for order in made.orders]  # in the order of the wire, unlike names and types
+    lengths = [made.array_lengths[order] for order in made.orders]  # in wire order, unlike names and types
     for name, type_, length in zip(made.fieldnames, made.fieldtypes, lengths, strict=True):
         if name in fixed:
             values.append(fixed[name])
@@ -149,9 +149,9 @@ def _value(type_: str, chance: random.Random) -> float:
 
 
 def _of_system(frame: bytes, system: int) -> bytes:
-    """The frame with another system id, and its CRC made anew."""
+    """The frame with another system id and a new CRC."""
     extra = CRC_EXTRA[int.from_bytes(frame[7:10], "little")]
-    return with_crc(frame[:5] + bytes([system]) + frame[6:-2], MIRROR[extra : extra + 1])
+    return with_crc(frame[:5] + bytes([system]) + frame[6:-2], REVERSED[extra : extra + 1])
 
 
 def _signing_time() -> int:

@@ -1,43 +1,41 @@
-"""Writes what the gateway needs of the MAVLink definitions: `python dialects/generate.py [OUTPUT_FOLDER]`.
+"""Writes the MAVLink definitions that the gateway needs: `python dialects/generate.py [OUTPUT_FOLDER]`.
 
 Input: the XML files inside pymavlink (ArduPilot's definitions, all vendors), `upstream.xml` (messages that only
-mavlink/mavlink has) and `mav_robot_status.xml` (ours). Output, into `mav_robot_status/mavlink` unless told otherwise:
+mavlink/mavlink has) and `mav_robot_status.xml` (ours). Output, below `mav_robot_status` or below OUTPUT_FOLDER:
 
-* `definitions.py`: CRC_EXTRA of every known message id; layout of the messages that we use; names of enumerations.
-* `pymavlink_dialect.py`: a pymavlink dialect of the same messages, for the fake autopilot and as oracle in the tests.
+* `mavlink/definitions.py`: CRC_EXTRA of every known message id; layout of the messages that the gateway uses, without
+  the fields that it does not read; names of enumerations.
+* `mavlink/enumerations.py`: message ids and the values of enumerations by their MAVLink names, as plain integers.
+* `testing/definitions.py`: the same messages with all their fields, for the fake autopilot.
 
-`tests/unit/mavlink/test_definitions.py` runs this and compares, so neither file can be edited by hand.
+`tests/unit/mavlink/test_definitions.py` runs this and compares the files, so they cannot be edited by hand.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
 import pathlib
 import sys
-import tempfile
-import xml.etree.ElementTree as ET
 
 from pymavlink import dialects as pymavlink_dialects
-from pymavlink.generator import mavgen, mavparse
+from pymavlink.generator import mavparse
 
 HERE = pathlib.Path(__file__).resolve().parent
 XML = pathlib.Path(pymavlink_dialects.__file__ or "").parent / "v20"
 
-# The vendors' files; what includes what is resolved by us, each file being parsed alone. matrixpilot and paparazzi are
-# left out: they give ids of ardupilotmega another meaning.
+# The vendors' files. Each is parsed without its includes. matrixpilot and paparazzi are not in the list: they give ids
+# of ardupilotmega another meaning.
 PUBLIC = (
     "minimal standard common development ardupilotmega uAvionix icarous loweheiser cubepilot csAirLink ASLUAV "
     "ualberta storm32 AVSSUAS python_array_test test"
 ).split()
 
-# CRC_EXTRA of ids that only mavlink/mavlink defines (common.xml, minimal.xml) and that we only check and pass on.
+# CRC_EXTRA of ids that only mavlink/mavlink defines (common.xml, minimal.xml). We only check and forward these.
 UPSTREAM_CRC_EXTRA = {
     8: 117, 19: 137, 52: 132, 80: 14, 290: 221, 300: 217, 334: 72, 336: 245, 380: 232, 395: 0, 400: 110, 401: 183,
     411: 106, 412: 33, 413: 77,
 }  # fmt: skip
 
-# What the gateway reads or writes, and what the fake autopilot needs beside it.
+# The messages that the gateway reads or writes, and those that the fake autopilot uses.
 USED = (
     "HEARTBEAT SYS_STATUS SYSTEM_TIME SET_MODE PARAM_REQUEST_READ PARAM_VALUE GPS_RAW_INT ATTITUDE "
     "LOCAL_POSITION_NED GLOBAL_POSITION_INT SERVO_OUTPUT_RAW REQUEST_DATA_STREAM VFR_HUD COMMAND_INT COMMAND_LONG "
@@ -46,7 +44,8 @@ USED = (
     "ESC_TELEMETRY_5_TO_8 ESC_TELEMETRY_9_TO_12 ROBOT_STATUS"
 ).split()
 
-# Fields that nobody reads, of the messages that come most often or have many; a frame that we write has zeros there.
+# Fields that the gateway does not read, in messages that are frequent or have many fields. Frames that we send have
+# zeros in these fields.
 UNREAD = {
     "SYS_STATUS": "load voltage_battery current_battery drop_rate_comm errors_comm errors_count3 errors_count4 "
     "battery_remaining",
@@ -62,7 +61,7 @@ UNREAD = {
     "flight_custom_version middleware_custom_version os_custom_version uid2",
 }
 
-# Enumerations whose names reach the user; the prefix is cut off.
+# Enumerations with names that the user sees, and the prefix to remove.
 ENUMS = {
     "AUTOPILOT_NAMES": ("MAV_AUTOPILOT", "MAV_AUTOPILOT_"),
     "TYPE_NAMES": ("MAV_TYPE", "MAV_TYPE_"),
@@ -74,6 +73,17 @@ BIT_ENUMS = {
     "EXTENDED_SENSOR_NAMES": ("MAV_SYS_STATUS_SENSOR_EXTENDED", "MAV_SYS_STATUS_"),
 }
 
+# Enumerations whose values the code uses by name: whole ones, and single values of the long ones.
+NAMED_ENUMS = (
+    "MAV_AUTOPILOT MAV_TYPE MAV_STATE MAV_SEVERITY MAV_MODE_FLAG MAV_RESULT MAV_LANDED_STATE MAV_VTOL_STATE "
+    "GPS_FIX_TYPE MAV_STANDARD_MODE MAV_MODE_PROPERTY MAV_DATA_STREAM EKF_STATUS_FLAGS MAV_SYS_STATUS_SENSOR"
+).split()
+NAMED_VALUES = (
+    "MAV_CMD_DO_FLIGHTTERMINATION MAV_CMD_DO_AUX_FUNCTION MAV_CMD_GET_MESSAGE_INTERVAL MAV_CMD_SET_MESSAGE_INTERVAL "
+    "MAV_CMD_REQUEST_MESSAGE MAV_COMP_ID_ALL MAV_COMP_ID_AUTOPILOT1 MAV_COMP_ID_ONBOARD_COMPUTER "
+    "MAV_COMP_ID_ONBOARD_COMPUTER2 MAV_COMP_ID_ONBOARD_COMPUTER3 MAV_COMP_ID_ONBOARD_COMPUTER4"
+).split()
+
 STRUCT_CODES = {
     "char": "c", "uint8_t": "B", "uint8_t_mavlink_version": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h",
     "uint32_t": "I", "int32_t": "i", "uint64_t": "Q", "int64_t": "q", "float": "f", "double": "d",
@@ -81,6 +91,11 @@ STRUCT_CODES = {
 # Field names that are also methods of a tuple.
 SHADOWS = dict.fromkeys(("count", "index"), "  # type: ignore[assignment]")
 HEADER = '"""{}\n\nGenerated by dialects/generate.py: do not edit.\n"""\n\n'
+
+
+def sources() -> list[pathlib.Path]:
+    """The XML files that are read."""
+    return [XML / f"{name}.xml" for name in PUBLIC] + [HERE / "upstream.xml", HERE / "mav_robot_status.xml"]
 
 
 def parse(path: pathlib.Path) -> mavparse.MAVXML:
@@ -95,16 +110,15 @@ def field_code(field: mavparse.MAVField) -> tuple[str, str]:
     return STRUCT_CODES[field.type], "float" if field.type in ("float", "double") else "int"
 
 
-def known_fields(message: mavparse.MAVType) -> list[mavparse.MAVField]:
-    """The fields of a message, in wire order, that the gateway knows."""
+def read_fields(message: mavparse.MAVType) -> list[mavparse.MAVField]:
+    """The fields of a message, in wire order, that the gateway reads."""
     unread = UNREAD.get(message.name, "").split()
     assert {f.name for f in message.ordered_fields}.issuperset(unread), message.name
     return [f for f in message.ordered_fields if f.name not in unread]
 
 
-def layout(message: mavparse.MAVType) -> str:
+def layout(message: mavparse.MAVType, known: list[mavparse.MAVField]) -> str:
     """The struct of the known fields, up to the last of them."""
-    known = known_fields(message)
     codes = ""
     skipped = 0
     for field in message.ordered_fields:
@@ -116,6 +130,45 @@ def layout(message: mavparse.MAVType) -> str:
     return "<" + codes
 
 
+def message_class(message: mavparse.MAVType, known: list[mavparse.MAVField]) -> str:
+    """The class of one message, with its known fields."""
+    all_or_known = "all" if len(known) == len(message.ordered_fields) and UNREAD.get(message.name) else "the known"
+    out = f"class {class_name(message.name)}(NamedTuple):\n"
+    out += f'    """{message.name}, id {message.id}; {all_or_known} fields in wire order, arrays as raw bytes."""\n\n'
+    out += "".join(f"    {f.name}: {field_code(f)[1]}{SHADOWS.get(f.name, '')}\n" for f in known)
+    return out + "\n\n"
+
+
+def message_row(message: mavparse.MAVType, known: list[mavparse.MAVField]) -> str:
+    """The row of one message in the table of definitions."""
+    struct = f'Struct("{layout(message, known)}")'
+    row = f'{message.id}, "{message.name}", {message.wire_length}, {struct}, {class_name(message.name)}'
+    return f"    {message.id}: Definition({row}),\n"
+
+
+def full_definitions(files: list[mavparse.MAVXML]) -> str:
+    """The text of testing/definitions.py. Only a message with fields in UNREAD has a separate class there."""
+    messages = {m.name: m for file in files for m in file.message if m.name in USED}
+    full = [messages[name] for name in USED if name in UNREAD]
+    shared = sorted(["Definition", *(class_name(name) for name in USED if name not in UNREAD)])
+    texts = sorted({f.name for m in messages.values() for f in m.ordered_fields if f.array_length and f.type == "char"})
+    out = [HEADER.format("The MAVLink messages of the fake autopilot, with all their fields.")]
+    out.append("from struct import Struct\nfrom typing import Final, NamedTuple\n\n")
+    out.append("from ..mavlink import definitions\n")
+    out.append("from ..mavlink.definitions import (\n")
+    out += [f"    {name},\n" for name in shared]
+    out.append(")\n\n__all__ = [\n")
+    names = {"MESSAGES", "TEXTS", "Definition"} | {class_name(name) for name in USED}
+    out += [f'    "{name}",\n' for name in sorted(names, key=lambda name: (not name.isupper(), name))]
+    out.append("]\n\n\n")
+    out += [message_class(message, message.ordered_fields) for message in full]
+    out.append("MESSAGES: Final[dict[int, Definition]] = definitions.MESSAGES | {\n")
+    out += [message_row(message, message.ordered_fields) for message in full]
+    out.append("}\nTEXTS: Final = frozenset({" + ", ".join(f'"{name}"' for name in texts) + "})\n")
+    out.append('"""The fields that are arrays of characters."""\n')
+    return "".join(out)
+
+
 def definitions(files: list[mavparse.MAVXML]) -> str:
     """The text of definitions.py."""
     crc = dict(UPSTREAM_CRC_EXTRA)
@@ -125,25 +178,16 @@ def definitions(files: list[mavparse.MAVXML]) -> str:
         crc.update({m.id: m.crc_extra for m in file.message})
         messages.update({m.name: m for m in file.message if m.name in USED})
         enums.update({e.name: e for e in file.enum})
-    out = [HEADER.format("What the gateway needs of the MAVLink definitions.")]
+    out = [HEADER.format("The MAVLink definitions that the gateway needs.")]
     out.append("from struct import Struct\nfrom typing import Any, Final, NamedTuple\n\n\n")
-    for name in USED:
-        message = messages[name]
-        out.append(f"class {class_name(name)}(NamedTuple):\n")
-        out.append(f'    """{name}, id {message.id}; the known fields in wire order, arrays as raw bytes."""\n\n')
-        known = known_fields(message)
-        out += [f"    {f.name}: {field_code(f)[1]}{SHADOWS.get(f.name, '')}\n" for f in known]
-        out.append("\n\n")
+    out += [message_class(messages[name], read_fields(messages[name])) for name in USED]
     out.append("class Definition(NamedTuple):\n")
     out.append(
-        '    """How one message is laid out: `size` in bytes, extensions included; `layout` of the known fields."""\n\n'
+        '    """The layout of one message: `size` in bytes with extensions; `layout` of the known fields."""\n\n'
     )
     out.append("    id: int\n    name: str\n    size: int\n    layout: Struct\n    type: Any\n\n\n")
     out.append("MESSAGES: Final[dict[int, Definition]] = {\n")
-    for name in USED:
-        m = messages[name]
-        row = f'{m.id}, "{name}", {m.wire_length}, Struct("{layout(m)}"), {class_name(name)}'
-        out.append(f"    {m.id}: Definition({row}),\n")
+    out += [message_row(messages[name], read_fields(messages[name])) for name in USED]
     out.append("}\n")
     for table, (enum, prefix) in ENUMS.items():
         out.append(f"{table}: Final[dict[int, str]] = {{\n")
@@ -166,48 +210,39 @@ def definitions(files: list[mavparse.MAVXML]) -> str:
     return "".join(out)
 
 
+def enumerations(files: list[mavparse.MAVXML]) -> str:
+    """The text of enumerations.py."""
+    ids = {message.name: message.id for file in files for message in file.message}
+    enums: dict[str, dict[str, int]] = {}
+    for enum in (enum for file in files for enum in file.enum):  # several files define parts of MAV_CMD and others
+        values = {entry.name: entry.value for entry in enum.entry if not entry.name.endswith("ENUM_END")}
+        enums.setdefault(enum.name, {}).update(values)
+    every = {name: value for values in enums.values() for name, value in values.items()}
+    out = [HEADER.format("Message ids and values of MAVLink's enumerations, by name: plain integers.")]
+    out.append("from typing import Final\n\n")
+    out += [f"MAVLINK_MSG_ID_{name}: Final = {ids[name]}\n" for name in USED]
+    for name in NAMED_ENUMS:
+        entries = sorted(enums[name].items(), key=lambda entry: entry[1])
+        out += [f"{entry}: Final = {value}\n" for entry, value in entries]
+    out += [f"{name}: Final = {every[name]}\n" for name in NAMED_VALUES]
+    return "".join(out)
+
+
 def class_name(message: str) -> str:
     """GLOBAL_POSITION_INT -> GlobalPositionInt."""
     return "".join(part.capitalize() for part in message.split("_"))
 
 
-def trimmed_xml(files: list[mavparse.MAVXML], paths: list[pathlib.Path]) -> str:
-    """One XML file of only the messages in USED, without references to enumerations."""
-    root = ET.Element("mavlink")
-    ET.SubElement(root, "version").text = "3"
-    out = ET.SubElement(root, "messages")
-    found = {}
-    for path in paths:
-        for message in ET.parse(path).getroot().iter("message"):
-            if message.get("name") in USED:
-                found[message.get("name")] = message
-    for name in USED:
-        for field in found[name].iter("field"):
-            field.attrib.pop("enum", None)
-            field.attrib.pop("display", None)
-        out.append(found[name])
-    return ET.tostring(root, encoding="unicode")
-
-
-def pymavlink_dialect(files: list[mavparse.MAVXML], paths: list[pathlib.Path]) -> str:
-    """The text of pymavlink_dialect.py, made by pymavlink's own generator."""
-    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
-        source = pathlib.Path(folder) / "used.xml"
-        source.write_text(trimmed_xml(files, paths))
-        target = pathlib.Path(folder) / "used.py"
-        options = mavgen.Opts(str(target), wire_protocol="2.0", language="Python3", validate=False)
-        mavgen.mavgen(options, [str(source)])
-        text = target.read_text()
-    # generated code may hold no trace of the folder it was made in
-    return text.replace("Generated from: used.xml", "Generated by dialects/generate.py from: used.xml")
-
-
 def main() -> int:
-    out = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else HERE.parent / "mav_robot_status" / "mavlink"
-    paths = [XML / f"{name}.xml" for name in PUBLIC] + [HERE / "upstream.xml", HERE / "mav_robot_status.xml"]
-    files = [parse(path) for path in paths]
-    (out / "definitions.py").write_text(definitions(files))
-    (out / "pymavlink_dialect.py").write_text(pymavlink_dialect(files, paths))
+    out = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else HERE.parent / "mav_robot_status"
+    files = [parse(path) for path in sources()]
+    for name, text in (
+        ("mavlink/definitions.py", definitions(files)),
+        ("mavlink/enumerations.py", enumerations(files)),
+        ("testing/definitions.py", full_definitions(files)),
+    ):
+        (out / name).parent.mkdir(exist_ok=True)
+        (out / name).write_text(text)
     return 0
 
 

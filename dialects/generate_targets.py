@@ -1,7 +1,7 @@
-"""Writes where each message names its target: `python dialects/generate_targets.py [OUTPUT_FOLDER]`.
+"""Writes the offsets of the target fields of each message: `python dialects/generate_targets.py [OUTPUT_FOLDER]`.
 
 Input: the XML files that generate.py reads, and UPSTREAM_TARGETS below. Output, into `mav_robot_status/mavlink` unless
-told otherwise: `targets.py`, which routing needs. `tests/unit/mavlink/test_targets.py` runs this and compares.
+another folder is given: `targets.py`, which routing needs. `tests/unit/mavlink/test_targets.py` runs this and compares.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import sys
 from generate import HERE, PUBLIC, XML, parse
 from pymavlink.generator import mavparse
 
-# Of the ids in generate.UPSTREAM_CRC_EXTRA, which only mavlink/mavlink defines; from its generated C library's table of
-# messages. Those that are not here name no target.
+# For the ids in generate.UPSTREAM_CRC_EXTRA, from the message table of mavlink/mavlink's C library. The other ids there
+# have no target.
 UPSTREAM_TARGETS = {19: (4, 5), 80: (2, 3), 400: (4, 5), 401: (4, 5), 412: (4, 5), 413: (4, 5)}
 
 HEADER = '''"""Where each message names its target.
@@ -28,13 +28,13 @@ TARGETS: Final[dict[int, tuple[int, int]]] = {
 '''
 FOOTER = '''}
 # fmt: on
-"""By message id: the offsets of target_system and of target_component (-1: there is none) in the payload. Messages that
-are not here name no target. MANUAL_CONTROL's `target` is one, as in MAVLink's C library."""
+"""By message id: the offsets of target_system and of target_component (-1: no such field) in the payload. Other
+messages have no target. MANUAL_CONTROL's `target` counts as target_system, as in MAVLink's C library."""
 '''
 
 
 def offsets(message: mavparse.MAVType) -> tuple[int, int]:
-    """Where target_system and target_component stand; pymavlink knows which fields are meant."""
+    """The offsets of target_system and target_component, as pymavlink computes them."""
     has_component = message.message_flags & mavparse.FLAG_HAVE_TARGET_COMPONENT
     return message.target_system_ofs, message.target_component_ofs if has_component else -1
 
@@ -44,7 +44,7 @@ def targets(files: list[mavparse.MAVXML]) -> str:
     table = dict(UPSTREAM_TARGETS)
     for file in files:
         for message in file.message:
-            table.pop(message.id, None)  # a later file's definition of an id counts, as it does for its CRC_EXTRA
+            table.pop(message.id, None)  # a later file overrides an id, as for its CRC_EXTRA
             if message.message_flags & mavparse.FLAG_HAVE_TARGET_SYSTEM:
                 table[message.id] = offsets(message)
     entries = [f"{key}: {table[key]}," for key in sorted(table)]

@@ -1,37 +1,42 @@
-"""Writes `docs/reference.md` from the tables in the code: `python docs/make_reference.py [OUTPUT_FILE]`.
+"""Writes `docs/reference/autopilots.md` from the tables in the code: `python docs/make_reference.py [OUTPUT_FILE]`.
 
 `tests/docs/test_reference.py` runs this and compares, so the page cannot drift from the code.
 """
 
 from __future__ import annotations
 
+import math
 import pathlib
 import sys
 from collections.abc import Iterable, Iterator
 
-from mav_robot_status.hardware import causes, identity, sensors
-from mav_robot_status.hardware.fields.inhibits import INHIBITS
-from mav_robot_status.hardware.fields.view import sensor_name
-from mav_robot_status.hardware.flight_mode import ARDUPILOT_TABLES, INAV_LIMITS
-from mav_robot_status.hardware.hearing.words import TEXT_TABLES
-from mav_robot_status.hardware.identity import Stack
-from mav_robot_status.hardware.modes import px4, standard
-from mav_robot_status.hardware.requests import Wanted, wanted_of
-from mav_robot_status.hardware.texts import TextRule, When, common
+from mav_robot_status.gateway import plugins
+from mav_robot_status.hardware.mavlink import causes, identity
+from mav_robot_status.hardware.mavlink.autopilots import AUTOPILOTS, ardupilot, inav, px4
+from mav_robot_status.hardware.mavlink.autopilots import modes as standard
+from mav_robot_status.hardware.mavlink.autopilots import texts as common
+from mav_robot_status.hardware.mavlink.autopilots.sensor_weights import EXTENDED_BITS
+from mav_robot_status.hardware.mavlink.autopilots.texts import TextRule, When
+from mav_robot_status.hardware.mavlink.autopilots.wanted import Wanted
+from mav_robot_status.hardware.mavlink.identity import sensor_name
+from mav_robot_status.hardware.mavlink.requests.message_intervals import wanted_of
+from mav_robot_status.hardware.mavlink.rules.inhibits import INHIBITS
+from mav_robot_status.hardware.mavlink.state import sensors
 from mav_robot_status.interface import RobotMode
+from mav_robot_status.interface.options import Declared
 from mav_robot_status.mavlink.definitions import TYPE_NAMES
 
 HERE = pathlib.Path(__file__).resolve().parent
 
-HEAD = """# Reference: what each message means
+HEAD = """# Flight modes, texts, sensor bits and error codes
 
 Generated from the tables in the code by `python docs/make_reference.py`; do not edit.
 
-The status informs; it is no safety function.
+The status informs. It is not a safety function.
 """
 
 RULES = {
-    causes.Clears.REBOOT: "when the autopilot no longer says so; an autopilot reboot",
+    causes.Clears.REBOOT: "when the autopilot no longer reports it; an autopilot reboot",
     causes.Clears.FAILSAFE: "its clear text; " + causes.Clears.FAILSAFE.value,
     causes.Clears.ARMING: causes.Clears.ARMING.value,
     causes.Clears.HOLD: causes.Clears.HOLD.value,
@@ -52,7 +57,7 @@ def modes() -> Iterator[str]:
     yield "## Flight modes\n"
     yield "AUTO: a program decides the next motion. MANUAL: a pilot's sticks do. Any other number is UNKNOWN, unless"
     yield "`mode_overrides` names it.\n"
-    for family, modes_of in ARDUPILOT_TABLES.items():
+    for family, modes_of in ardupilot.MODES.items():
         types = ", ".join(TYPE_NAMES.get(t, str(t)) for t, f in sorted(identity.FAMILIES.items()) if f is family)
         yield f"### ArduPilot {family.value}\n"
         yield f"MAV_TYPE {types}.\n"
@@ -67,11 +72,11 @@ def modes() -> Iterator[str]:
     rows += [(key, name, mode) for key, (name, mode) in px4.SUB.items()]
     yield from table(("main", "sub", "flight mode", "mode"), ((*key, name, mode.name) for key, name, mode in rows))
     yield "### INAV that announces itself as ArduPilot\n"
-    for family, limit in INAV_LIMITS.items():
+    for family, limit in inav.LIMITS.items():
         yield f"* ArduPilot's {family.value} numbers; from {limit} up there is no mapping: UNKNOWN."
     yield "\n### Every other autopilot\n"
-    yield "The first that says something: CURRENT_MODE.standard_mode, the standard mode of the AVAILABLE_MODES entry,"
-    yield "its property AUTO_MODE (AUTO), the flags of HEARTBEAT.base_mode.\n"
+    yield "The first source that is available: CURRENT_MODE.standard_mode, the standard mode of the"
+    yield "AVAILABLE_MODES entry, its property AUTO_MODE (AUTO), the flags of HEARTBEAT.base_mode.\n"
     yield from table(
         ("standard mode", "name", "mode"), ((n, name, mode.name) for n, (name, mode) in standard.STANDARD_MODES.items())
     )
@@ -80,7 +85,7 @@ def modes() -> Iterator[str]:
 
 def codes() -> Iterator[str]:
     yield "## Error codes\n"
-    yield "Of several active causes the first of this table is error_code; all are in `errors`.\n"
+    yield "If several causes are active, error_code is the first of this table. `errors` has all of them.\n"
     ordered = sorted(causes.CAUSES.items(), key=lambda item: item[1].priority)
     yield from table(
         ("code", "name", "ends with"),
@@ -97,33 +102,35 @@ def _ending(cause: causes.Cause) -> str:
 
 def bits() -> Iterator[str]:
     yield "## SYS_STATUS bits\n"
-    yield "A bit is faulty when present, enabled and not healthy (PX4: enabled and not healthy), in two messages in a"
-    yield f"row or for {sensors.DEBOUNCE_SECONDS:g} s. HARD: an error, armed or not. SOFT: an error while armed.\n"
+    yield "A bit is faulty if it is present, enabled and not healthy (PX4: enabled and not healthy), in two"
+    yield f"messages in a row or for {sensors.DEBOUNCE_SECONDS:g} s. HARD: an error, armed or not. SOFT: an error while"
+    yield "armed.\n"
     yield from table(
-        ("bit", "name", "code", *(stack.value for stack in Stack)),
+        ("bit", "name", "code", *(profile.name for profile in AUTOPILOTS)),
         (
             (
                 bit,
                 sensor_name(bit),
                 3000 + bit,
-                *(w.name if (w := sensors.WEIGHTS[stack].get(bit)) else "ignored" for stack in Stack),
+                *(w.name if (w := p.sensors.weights.get(bit)) else "ignored" for p in AUTOPILOTS),
             )
             for bit in range(31)
         ),
     )
-    yield f"Bits {sensors.EXTENDED_BITS.start} to {sensors.EXTENDED_BITS.stop - 1} of the extended word are HARD.\n"
+    yield f"Bits {EXTENDED_BITS.start} to {EXTENDED_BITS.stop - 1} of the extended word are HARD.\n"
 
 
 def texts() -> Iterator[str]:
     yield "## Texts\n"
-    yield "Regular expressions, matched from the start of a STATUSTEXT; the first row that matches decides. A text that"
-    yield "no row knows is 6000 + its severity for some seconds, if that is 2 or less and the vehicle is armed.\n"
-    for stack, rules in TEXT_TABLES.items():
-        if rules:
-            yield f"### {stack.value}\n"
-            yield from table(("text", "effect"), ((f"`{r.pattern.pattern}`", _effect(r)) for r in rules))
-    yield "### Of any autopilot, before a text counts as unclassified\n"
-    yield from table(("text", "effect"), ((f"`{r.pattern.pattern}`", _effect(r)) for r in common.RULES))
+    yield "Regular expressions, matched from the start of a STATUSTEXT. The first row that matches decides. A text"
+    yield "that matches no row is 6000 + its severity for `text_hold_s`, if the severity is 2 or less and the vehicle"
+    yield "is armed.\n"
+    for profile in AUTOPILOTS:
+        if profile.texts.rules:
+            yield f"### {profile.name}\n"
+            yield from table(("text", "effect"), ((f"`{r.pattern.pattern}`", _effect(r)) for r in profile.texts.rules))
+    yield "### All autopilots: texts that never count as unclassified\n"
+    yield from table(("text", "effect"), ((f"`{r.pattern.pattern}`", _effect(r)) for r in common.COMMON))
 
 
 def _effect(rule: TextRule) -> str:
@@ -138,13 +145,38 @@ def reasons() -> Iterator[str]:
     yield from table(("bit", "name"), enumerate(INHIBITS))
 
 
+def outputs() -> Iterator[str]:
+    yield "## Options of the publishers\n"
+    yield "In a configuration: `{type: NAME, OPTION: VALUE}`. The command line has the arguments of the last column.\n"
+    for name in sorted(plugins.OURS[plugins.PUBLISHERS]):
+        options = plugins.load(plugins.PUBLISHERS, name, "").options_type.declared()
+        yield f"### {name}\n"
+        if options:
+            rows = ((_code(o.name), _default(o), o.option.help, _code(o.option.flag)) for o in options)
+            yield from table(("option", "default", "meaning", "argument"), rows)
+        else:
+            yield "No options.\n"
+
+
+def _code(text: str | None) -> str:
+    return f"`{text}`" if text else ""
+
+
+def _default(option: Declared) -> str:
+    if option.default in (None, (), ""):
+        return ""
+    text = str(option.default).lower().removesuffix(".0") if option.kind in (bool, float) else str(option.default)
+    bounds = f", {option.option.low:g} to {option.option.high:g}" if option.option.low > -math.inf else ""
+    return f"{_code(text)}{bounds}"
+
+
 def requested() -> Iterator[str]:
-    yield "## Messages that are asked for\n"
-    yield "Only where one arrives at less than half this rate, and never if it is faster.\n"
+    yield "## Requested messages\n"
+    yield "The gateway requests a message only if it arrives at less than half this rate.\n"
     sets: dict[tuple[Wanted, ...], list[str]] = {}
-    for stack in Stack:
+    for profile in AUTOPILOTS:
         for family in identity.Family:
-            sets.setdefault(wanted_of(stack, family, True), []).append(f"{stack.value} {family.value}")
+            sets.setdefault(wanted_of(profile, family, True), []).append(f"{profile.name} {family.value}")
     for wanted, kinds in sets.items():
         yield f"{', '.join(kinds)}:\n"
         yield from table(("message", "Hz"), ((w.name, f"{w.rate:g}") for w in wanted))
@@ -152,12 +184,12 @@ def requested() -> Iterator[str]:
 
 def page() -> str:
     """The whole page."""
-    parts = (modes(), codes(), reasons(), bits(), texts(), requested())
+    parts = (modes(), codes(), reasons(), bits(), texts(), requested(), outputs())
     return HEAD + "\n" + "\n".join(line for part in parts for line in part).rstrip() + "\n"
 
 
 def main() -> int:
-    out = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "reference.md"
+    out = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "reference" / "autopilots.md"
     out.write_text(page(), encoding="utf-8")
     return 0
 

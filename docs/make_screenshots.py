@@ -1,6 +1,6 @@
-"""Makes the pictures of `docs/web.md` anew: `python docs/make_screenshots.py [FOLDER]`. Two minutes; needs chromium.
+"""Makes the pictures of `docs/how-to/web.md`: `python docs/make_screenshots.py [FOLDER]`. Takes two minutes.
 
-The demo's rover and some neighbours, a real gateway with its page, a real browser.
+Runs the demo's rover, some more vehicles, a real gateway with its page, and chromium.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
 from mav_robot_status.config import Config, LinkConfig, PublisherConfig, VehicleConfig  # noqa: E402
-from mav_robot_status.gateway.live import Live  # noqa: E402
-from mav_robot_status.gateway.plant import DEFAULT_CONTROLLER  # noqa: E402
+from mav_robot_status.gateway.controller_config import DEFAULT_CONTROLLER  # noqa: E402
+from mav_robot_status.gateway.event_loop import EventLoop  # noqa: E402
 from mav_robot_status.publishers.web.publisher import HttpPublisher  # noqa: E402
 from mav_robot_status.testing import DEMO, FakeAutopilot, arducopter, ardurover, px4  # noqa: E402
 from tests.system.browser import MISSING, Browser  # noqa: E402
 
-STORY = 90.0
-"""Seconds of the demo, again and again, before the pictures: so that the bands have something to show."""
+HISTORY = 90.0
+"""Seconds that the demo runs, in a loop, before the pictures: the bands then have a history."""
 CRASHED = "document.querySelector('#rows tr td:nth-child(7)')?.innerText.includes('4001')"
-"""When the demo's rover has run into a wall."""
+"""True after the demo's rover has hit a wall."""
 SCREEN, PHONE = (1280, 860), (360, 740)
 VEHICLES = tuple(
     VehicleConfig(system=system, handle=name)
@@ -40,28 +40,28 @@ class Site:
         page = PublisherConfig("http", {"listen": "127.0.0.1:0"})
         controller = dataclasses.replace(DEFAULT_CONTROLLER, publishers=(page,))
         links = (LinkConfig("udpin:127.0.0.1:0"),)
-        self.gateway = Live(Config(links=links, vehicles=VEHICLES, controllers=(controller,)), sys.stdout)
-        publisher = next(iter(self.gateway.plant.publishers.values()))
+        self.gateway = EventLoop(Config(links=links, vehicles=VEHICLES, controllers=(controller,)), sys.stdout)
+        publisher = next(iter(self.gateway.pipeline.publishers.values()))
         assert isinstance(publisher, HttpPublisher)
         self.url = publisher.url
         self.thread = threading.Thread(target=self.gateway.run, daemon=True)
         self.thread.start()
         stack.callback(self.stop)
-        to = ("127.0.0.1", self.gateway.stations[0].link.port)  # type: ignore[attr-defined]
-        stories = (DEMO, arducopter.READY, ardurover.AUTO, px4.READY, ardurover.READY)
+        to = ("127.0.0.1", self.gateway.endpoints[0].link.port)  # type: ignore[attr-defined]
+        scenarios = (DEMO, arducopter.READY, ardurover.AUTO, px4.READY, ardurover.READY)
         self.vehicles = [
             stack.enter_context(
-                FakeAutopilot(story, to=to, system=system, loop=story is DEMO, on_note=lambda step: None)
+                FakeAutopilot(scenario, to=to, system=system, loop=scenario is DEMO, on_note=lambda step: None)
             )
-            for system, story in enumerate(stories, 1)
+            for system, scenario in enumerate(scenarios, 1)
         ]
 
-    def live(self) -> None:
-        """Let things happen."""
+    def run(self) -> None:
+        """Run the vehicles until the page has something to show."""
         time.sleep(5)
         self.vehicles[1].set(safety_switch=True)
         self.vehicles[4].silence()
-        time.sleep(STORY)
+        time.sleep(HISTORY)
 
     def stop(self) -> None:
         """End the gateway."""
@@ -78,7 +78,7 @@ def main() -> int:
     with ExitStack() as stack:
         browser = stack.enter_context(closing(Browser()))
         site = Site(stack)
-        site.live()
+        site.run()
         browser.driver.get(f"{site.url}#/")
         browser.wait(CRASHED, 60)
         for theme in ("light", "dark"):

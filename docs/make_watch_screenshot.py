@@ -1,8 +1,8 @@
-"""Draws docs/screenshots/watch.svg: what `watch` shows of the demo's rover and some others, after sixteen seconds.
+"""Draws docs/screenshots/watch.svg: the screen of `watch` with the demo's rover and some others, after sixteen seconds.
 
     .venv/bin/python docs/make_watch_screenshot.py [FILE]
 
-Without sockets, threads or a clock, so it draws the same picture every time.
+It uses no sockets, threads or clock, so it draws the same picture every time.
 """
 
 from __future__ import annotations
@@ -17,14 +17,12 @@ from rich.console import Console
 from rich.text import Text
 
 from mav_robot_status.config import Config
-from mav_robot_status.gateway.explain import NO_OUTPUT
-from mav_robot_status.gateway.plant import Plant
-from mav_robot_status.gateway.replay import Nobody
-from mav_robot_status.gateway.watched import Rates, on_a_board
-from mav_robot_status.hardware.requests import COMMON, OUTPUT_WATCH
+from mav_robot_status.gateway.background import Rates, on_a_board
+from mav_robot_status.gateway.replay import ReplayPipeline
+from mav_robot_status.hardware.mavlink.autopilots.wanted import COMMON, OUTPUT_WATCH
 from mav_robot_status.mavlink.framing import Parser
-from mav_robot_status.mavlink.pymavlink_dialect import MAVLink
 from mav_robot_status.publishers.board import Board, BoardPublisher
+from mav_robot_status.streams import NO_OUTPUT
 from mav_robot_status.testing import DEMO, ManualClock, arducopter, ardurover, px4, px4_vtol
 from mav_robot_status.testing.vehicle_model import VehicleModel
 from mav_robot_status.views.terminal.paint import STYLES
@@ -54,7 +52,7 @@ def main() -> None:
     for line in render(play(), *SIZE):
         console.print(Text.assemble(*((span.text, STYLES[span.style]) for span in line)), end="\n", no_wrap=True)
     svg = console.export_svg(title="mav-robot-status watch udp:127.0.0.1:14550", unique_id="watch")
-    # a picture that needs nothing from the net
+    # the picture must not load fonts from the network
     svg = re.sub(r"@font-face \{.*?\}", "", svg, flags=re.DOTALL)
     path.write_text("".join(line.rstrip() + "\n" for line in svg.splitlines()), "utf-8")
 
@@ -62,32 +60,30 @@ def main() -> None:
 def play() -> State:
     """The state of the screen after SECONDS."""
     clock = ManualClock()
-    plant = Plant(on_a_board(Config()), Nobody(), NO_OUTPUT)
-    board = next(p.board for p in plant.publishers.values() if isinstance(p, BoardPublisher))
-    voices = []
+    pipeline = ReplayPipeline(on_a_board(Config()), NO_OUTPUT)
+    board = next(p.board for p in pipeline.publishers.values() if isinstance(p, BoardPublisher))
+    feeds = []
     for number, scenario in enumerate(SCENARIOS, 1):
-        mav = MAVLink(None, srcSystem=number, srcComponent=1)
         model = VehicleModel(scenario, clock.now().mono)
-        for wanted in (*COMMON, *OUTPUT_WATCH):  # the gateway would ask for what does not come
+        for wanted in (*COMMON, *OUTPUT_WATCH):  # the gateway requests missing messages
             model.request(wanted.id, 1 / wanted.rate)
-        voices.append((model, mav, Parser(None), Rates()))
+        feeds.append((model, number, Parser(None), Rates()))
     log = []
     for _ in range(round(SECONDS / TICK)):
         now = clock.advance(TICK)
-        for model, mav, parser, rates in voices:
+        for model, number, parser, rates in feeds:
             for outgoing in model.run(now):
-                mav.seq = outgoing.seq
-                for frame in parser.feed(outgoing.message.pack(mav)):
-                    plant.take(frame, now)
+                for frame in parser.feed(outgoing.frame(number)):
+                    pipeline.vehicles.take(frame, now)
                     rates.take(frame.message_id, now.mono)
         lost = _lost(board)
-        plant.tick(now)
+        pipeline.tick(now)
         log += [
             Logged(now.unix_us, f"lost vehicle {name}: no heartbeat for 3.5 s", True) for name in _lost(board) - lost
         ]
     now = clock.now()
     vehicles = []
-    for entry, (_, _, _, rates) in zip(board, voices, strict=True):
+    for entry, (_, _, _, rates) in zip(board, feeds, strict=True):
         age = None if entry.heartbeat_age is None else entry.heartbeat_age + now.mono - entry.at
         vehicles.append(Vehicle(entry.line, age, rates.at(now.mono)))
     chosen = vehicles[CHOSEN]

@@ -1,1 +1,1 @@
-"""Fuzzing of everything that reads what others wrote: `python -m fuzz --help`. See docs/fuzzing.md."""
+"""Fuzzing of all code that reads untrusted data: `python -m fuzz --help`. See docs/how-to/fuzzing.md."""

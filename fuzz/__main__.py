@@ -1,4 +1,4 @@
-"""`python -m fuzz TARGET [--count N]`: a target on mutations of its corpus, with atheris or with the plain mutator."""
+"""`python -m fuzz TARGET [--count N]`: run a target on mutations of its corpus, with atheris or the plain mutator."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .mutate import inputs
 from .targets import TARGETS, UNITS
 
 CORPUS = Path(__file__).parent / "corpus"
-WORDS = {
+TOKENS = {
     "configuration": b"links: outs: vehicles: identity: hardware: requests: signing: type: publishers: url: passive: "
     b"- { } [ ] ' \" # | > & * !! ~ null true .inf 1e999 0x10 1_000 10ms 3.5 -1 \t \xc3\xa9 \xe2\x80\xa8".split(b" "),
     "connection": b"udp: udpin: udpout: tcp: tcpin: serial: // : , @ [ ] 127.0.0.1 ::1 /dev/tty 14550 %".split(),
@@ -24,9 +24,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m fuzz", description=__doc__)
     parser.add_argument("target", choices=sorted(TARGETS))
     parser.add_argument("--count", type=int, default=100_000, help="units (frames, files) to try (100000)")
-    parser.add_argument("--seed", type=int, default=1, help="of the plain mutator (1)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the plain mutator (1)")
     parser.add_argument(
-        "--atheris", action="store_true", help="let atheris guide by coverage; needs `pip install atheris`"
+        "--atheris",
+        action="store_true",
+        help="guide the mutations by coverage with atheris; needs `pip install atheris`",
     )
     options = parser.parse_args()
     if options.atheris:
@@ -35,7 +37,7 @@ def main() -> int:
     corpus = [path.read_bytes() for path in sorted((CORPUS / options.target).iterdir())]
     done = number = 0
     started = time.monotonic()
-    for number, data in enumerate(inputs(corpus, WORDS.get(options.target, ()), options.seed), 1):
+    for number, data in enumerate(inputs(corpus, TOKENS.get(options.target, ()), options.seed), 1):
         if done >= options.count:
             break
         try:
@@ -51,7 +53,7 @@ def main() -> int:
 
 
 def coverage_guided(name: str, count: int) -> int:
-    """Run under atheris, which ends the process by itself; what it finds is written to the present folder."""
+    """Run under atheris. It ends the process, and writes its findings to the current folder."""
     import atheris
 
     with atheris.instrument_imports(include=["mav_robot_status"]):
@@ -64,7 +66,7 @@ def coverage_guided(name: str, count: int) -> int:
     def one(data: bytes) -> None:
         targets.TARGETS[name](data)
 
-    grown = tempfile.mkdtemp(prefix="corpus-")  # the first folder takes what widens the coverage; ours stays as it is
+    grown = tempfile.mkdtemp(prefix="corpus-")  # atheris adds inputs to the first folder; ours stays unchanged
     atheris.Setup([sys.argv[0], f"-runs={count}", "-max_len=4096", grown, str(CORPUS / name)], one)
     atheris.Fuzz()
     return 0

@@ -1,4 +1,4 @@
-"""Writes the corpus, from our own encoder, examples and tables: `python fuzz/make_corpus.py`."""
+"""Writes the corpus from our encoder, examples and tables: `python fuzz/make_corpus.py`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import random
 import struct
 from pathlib import Path
 
-from mav_robot_status.link.url import KINDS
+from mav_robot_status.links.url import KINDS
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.signing import Signer
@@ -21,11 +21,11 @@ record: flight.tlog
 coalesce: 10 ms
 requests: none
 """
-"""The keys that no example uses."""
+"""Configuration keys that the examples lack."""
 
 
 def write(target: str, entries: list[bytes]) -> None:
-    """One file for each entry."""
+    """Write one file for each entry."""
     folder = HERE / "corpus" / target
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.iterdir():
@@ -35,7 +35,7 @@ def write(target: str, entries: list[bytes]) -> None:
 
 
 def frames(version: int) -> list[bytes]:
-    """A frame of every message that we know, with fields that are not all zero."""
+    """One frame of every known message, with fields that are not all zero."""
     rng = random.Random(version)
     made = []
     for sequence, definition in enumerate(MESSAGES.values()):
@@ -53,9 +53,9 @@ def main() -> None:
     write("framing", [b"".join(frames(1)), b"".join(frames(2)), b"".join(signed[:8]), *frames(2)[:6]])
     write("signing", [b"".join(signed[:8]), *signed[:4], b"".join(frames(2)[:4])])
     heartbeat = struct.pack("<IBBBBB", 4, 2, 3, 209, 4, 3)
-    story = [bytes([8, 16, number % 3, number]) + heartbeat[: 9 - number % 4] for number in range(60)]
+    heartbeats = [bytes([8, 16, number % 3, number]) + heartbeat[: 9 - number % 4] for number in range(60)]
     rng = random.Random(7)
-    write("messages", [b"".join(story), rng.randbytes(2000), b"".join(story[:9]) + rng.randbytes(600)])
+    write("messages", [b"".join(heartbeats), rng.randbytes(2000), b"".join(heartbeats[:9]) + rng.randbytes(600)])
     text = encode(Statustext(2, b"PreArm: Compass not calibrated", 7, 1), system=1, component=1, sequence=0)
     write("texts", [b"".join(bytes([20, 3, n % 4, n]) + text[10:30] for n in range(12)), rng.randbytes(500)])
     write("configuration", [*(path.read_bytes() for path in sorted(EXAMPLES.glob("*.yaml"))), RARE])

@@ -1,4 +1,4 @@
-"""What is fuzzed: each target takes bytes, raises on a defect, and says how many units (frames, files) it has tried."""
+"""The fuzz targets. Each reads bytes, raises on a defect, and returns the number of units (frames, files) it tried."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from mav_robot_status.clock import Instant
 from mav_robot_status.config.document import parse_document
 from mav_robot_status.config.reader import build
 from mav_robot_status.errors import ConfigError, UsageError
-from mav_robot_status.hardware import statustext
-from mav_robot_status.hardware.kinds import WANTED_IDS
-from mav_robot_status.hardware.options import HardwareOptions
-from mav_robot_status.hardware.robot_hw import MavlinkRobotHW
-from mav_robot_status.link.url import parse
+from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+from mav_robot_status.hardware.mavlink.options import HardwareOptions
+from mav_robot_status.hardware.mavlink.state import text_assembly
+from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
 from mav_robot_status.mavlink.encode import enclose
 from mav_robot_status.mavlink.framing import Frame, Parser
@@ -21,23 +21,26 @@ from mav_robot_status.mavlink.signing import Signer, Verifier, is_signed
 from mav_robot_status.mavlink.wire import MAX_FRAME
 
 PIECE: Final = 97
-"""Bytes fed at once: frames are cut everywhere."""
+"""Bytes of one feed, so that feeds end anywhere within a frame."""
 KEY: Final = bytes(32)
 SOME: Final = sorted(WANTED_IDS)
 LONGEST_LINE: Final = 2000
-"""Characters of a message for a person, at most."""
+"""The most characters of an error message."""
 
 
 def framing(data: bytes) -> int:
-    """Bytes as they come: nothing raises, little is kept, no byte is counted twice. A unit is a frame, good or bad."""
+    """Any bytes: the parser does not raise, keeps at most MAX_FRAME bytes, and counts no byte twice.
+
+    A unit is a frame, valid or not.
+    """
     for wanted in (WANTED_IDS, None):
         parser = Parser(wanted)
-        taken = 0
+        returned = 0
         for start in range(0, len(data), PIECE):
             for frame in parser.feed(data[start : start + PIECE]):
-                taken += len(frame.raw)
+                returned += len(frame.raw)
             assert parser.pending <= MAX_FRAME
-        assert taken + parser.pending + parser.counters.garbage_bytes <= len(data)
+        assert returned + parser.pending + parser.counters.garbage_bytes <= len(data)
     counters = parser.counters
     return (
         counters.frames + counters.incompatible + sum(counters.bad_crc.values()) + sum(counters.unknown.values()) or 1
@@ -45,7 +48,7 @@ def framing(data: bytes) -> int:
 
 
 def messages(data: bytes) -> int:
-    """Frames with a good CRC and any payload, at any time, of three vehicles: hardware and status hold."""
+    """Valid frames of three vehicles with any payload at any time: the status keeps its invariants."""
     hw = MavlinkRobotHW(HardwareOptions())
     parser = Parser(WANTED_IDS)
     mono, count = 0.0, 0
@@ -57,9 +60,9 @@ def messages(data: bytes) -> int:
         now = Instant(mono, int(mono * 1e6))
         (frame,) = parser.feed(enclose(message_id, chunk[3:], system=system, component=1, sequence=count & 255))
         hw.take(frame, now)
-        if hw.stirred or mono >= hw.next_due():
+        if hw.dirty_vehicles or mono >= hw.next_due():
             hw.read(now)
-            hw.write(now)
+            hw.due_requests(now)
     for tracked in hw.vehicles:
         status = tracked.handle.status
         assert not (status.motion_possible == 1 and (status.e_stopped == 1 or status.drives_powered != 1)), status
@@ -68,7 +71,7 @@ def messages(data: bytes) -> int:
 
 
 def _chunks(data: bytes) -> Iterator[bytes]:
-    """Pieces of a length that the data itself tells: three bytes of header, a payload."""
+    """Cut data into pieces: three bytes of header with the length, then a payload."""
     at = 0
     while at + 4 <= len(data):
         size = 4 + data[at] % 60
@@ -77,7 +80,7 @@ def _chunks(data: bytes) -> Iterator[bytes]:
 
 
 def signing(data: bytes) -> int:
-    """Frames that nobody signed with our key, with a signature block of any content: none is accepted."""
+    """Frames with any signature block, none signed with our key: the verifier accepts none."""
     verifier = Verifier(Signer(KEY, 1), "none")
     count = 0
     for frame in Parser(None).feed(data):
@@ -90,21 +93,21 @@ def signing(data: bytes) -> int:
 
 
 def texts(data: bytes) -> int:
-    """Chunks of texts with any id, number and bytes: few are kept."""
-    assembly = statustext.EMPTY
+    """Text chunks with any id, number and bytes: the assembly keeps a bounded number."""
+    assembly = text_assembly.EMPTY
     count = 0
     for chunk in _chunks(data):
         count += 1
         now = Instant(count / 4, 0)
         message = Statustext(chunk[0] % 9, chunk[3:].ljust(50, b"\0")[:50], chunk[1] % 5, chunk[2] % 40)
-        assembly, _ = statustext.heard_chunk(assembly, message, now)
-        assembly, _ = statustext.overdue(assembly, now.mono)
-        assert len(assembly) <= statustext.MOST_TEXTS
+        assembly, _ = text_assembly.heard_chunk(assembly, message, now)
+        assembly, _ = text_assembly.overdue(assembly, now.mono)
+        assert len(assembly) <= text_assembly.MOST_TEXTS
     return max(count, 1)
 
 
 def configuration(data: bytes) -> int:
-    """A configuration file of any content: understood, or one line that says what is wrong."""
+    """Any configuration file: it is valid, or the error is one line."""
     try:
         build(parse_document(data.decode("utf-8", "replace"), "fuzz.yaml"))
     except ConfigError as error:
@@ -113,7 +116,7 @@ def configuration(data: bytes) -> int:
 
 
 def connection(data: bytes) -> int:
-    """A connection string of any content: understood, or one line that says what to write."""
+    """Any connection string: it is valid, or the error is one line."""
     try:
         parse(data.decode("utf-8", "replace"))
     except UsageError as error:
@@ -123,7 +126,7 @@ def connection(data: bytes) -> int:
 
 def _one_line(error: Exception) -> None:
     text = str(error)
-    assert text, "nothing is said"
+    assert text, "the error has no message"
     assert "\n" not in text, text
     assert len(text) < LONGEST_LINE, len(text)
 

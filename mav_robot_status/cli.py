@@ -1,4 +1,4 @@
-"""The command line: arguments -> a command. An error is one line on standard error, and an exit code."""
+"""The command line: arguments select a command. An error is one line on standard error and an exit code."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import sys
 import threading
 from typing import TYPE_CHECKING, NoReturn
 
-from . import __version__
 from .commands import COMMANDS, PROGRAM, command
 from .errors import MavRobotStatusError, UsageError
 from .streams import StderrHandler, complain, detach, open_missing
+from .version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
 class _Arguments(argparse.ArgumentParser):
-    """Tells a fault in one line, where argparse would print all options before it."""
+    """Reports an error in one line. argparse would print all options first."""
 
     def error(self, message: str) -> NoReturn:
         """Raises UsageError."""
@@ -29,7 +29,7 @@ class _Arguments(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command. 0 done; 1 a link or output failed for good; 2 usage, configuration, missing log file."""
+    """Returns the exit code: 0 done; 1 a link or output failed for good; 2 usage, configuration, missing log file."""
     open_missing()
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             _doubt_command(arguments[:1])
             arguments.insert(0, "run")
         if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, signal.default_int_handler)  # until the gateway has a handler of its own
+            signal.signal(signal.SIGTERM, signal.default_int_handler)  # until the gateway installs its handler
         return _run(arguments)
     except MavRobotStatusError as error:
         complain(f"{PROGRAM}: {error}")
@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _doubt_command(first: Sequence[str]) -> None:
-    """Raise UsageError where a connection is expected, and what stands there is nearly the name of a command."""
+    """Raise UsageError if the first argument looks like a misspelt command."""
     for word in first:
         near = difflib.get_close_matches(word, COMMANDS, 1, 0.75)
         if near and not os.path.exists(word):
@@ -64,15 +64,15 @@ def _run(arguments: list[str]) -> int:
             _log_to_stderr(options)
         return command(options.command).run(options)
     finally:
-        sys.stdout.flush()  # here, where a reader that has gone can be dealt with
+        sys.stdout.flush()  # here, where a closed pipe can be handled
 
 
 def _parser(asked: str) -> argparse.ArgumentParser:
-    """Every command has its line in the help, and the one that is asked for has its arguments."""
+    """The help lists every command. Only the given command gets its arguments."""
     parser = _Arguments(
         prog=PROGRAM,
         description="RobotStatus of MAVLink vehicles: can it move, who is in charge, and if it cannot move, why? "
-        "The status informs; it is no safety function.",
+        "The status is information, not a safety function.",
         epilog="The command `run` may be left out.",
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")

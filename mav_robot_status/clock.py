@@ -1,4 +1,4 @@
-"""Time as a value: whatever acts on time is handed an `Instant`; only the gateway asks a clock."""
+"""Time as a value: functions get an `Instant` as an argument; only the gateway reads a clock."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ class Instant(NamedTuple):
     """One moment on two clocks."""
 
     mono: float
-    """Seconds on a clock that never steps: everything that measures a duration uses it."""
+    """Seconds on a clock that never steps. All durations use it."""
     unix_us: int
-    """Microseconds since 1970 in UTC: only ever used as a stamp."""
+    """Microseconds since 1970 in UTC. Only time stamps use it."""
 
 
 def now() -> Instant:
-    """The present, for the live gateway. A log brings its own instants."""
-    return tuple.__new__(Instant, (time.monotonic(), time.time_ns() // 1000))  # asked at every turn of the live loop
+    """The present time, for the live gateway. A log has its own instants."""
+    return tuple.__new__(Instant, (time.monotonic(), time.time_ns() // 1000))  # called in every turn of the live loop
 
 
 def later(start: Instant, seconds: float) -> Instant:
@@ -31,13 +31,13 @@ def later(start: Instant, seconds: float) -> Instant:
 
 
 def rfc3339(unix_us: int) -> str:
-    """`2026-11-20T18:49:07.123456Z`: always UTC, always six decimals."""
+    """`2026-11-20T18:49:07.123456Z`: always UTC with six decimals."""
     seconds, us = divmod(unix_us, 1_000_000)
     return f"{_second(seconds)}.{us:06d}Z"
 
 
 @lru_cache(maxsize=64)
 def _second(unix_s: int) -> str:
-    if not FIRST_SECOND <= unix_s <= LAST_SECOND:  # a log may say anything
+    if not FIRST_SECOND <= unix_s <= LAST_SECOND:  # a log may hold any number
         unix_s = min(max(unix_s, FIRST_SECOND), LAST_SECOND)
     return datetime.fromtimestamp(unix_s, timezone.utc).isoformat()[:19]

@@ -1,22 +1,19 @@
-"""`IndustrialRobotStatusController`: hands the status in a handle to publishers, at a rate. It holds no other logic.
+"""`IndustrialRobotStatusController`: publishes the status of a handle at a rate. It has no other logic.
 
-A port of ros_control's industrial_robot_status_controller. Where it does otherwise a comment starts `ORIGINAL:`;
-`docs/controller.md` lists them.
+A port of ros_control's industrial_robot_status_controller. Where it differs, a comment starts with `ORIGINAL:`;
+`docs/explanation/controller.md` lists them.
 """
 
 from __future__ import annotations
 
 import logging
 import math
+import sys
 from collections import deque
 from typing import TYPE_CHECKING, Final
 
-from .interface import (
-    DEFAULT_HANDLE_NAME,
-    IndustrialRobotStatusHandle,
-    IndustrialRobotStatusInterface,
-    RobotStatusMsg,
-)
+from .errors import ConfigError
+from .interface import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle, IndustrialRobotStatusInterface, RobotStatusMsg
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,20 +24,20 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 DEFAULT_PUBLISH_RATE: Final = 10.0  # Hz
-MOST_CHANGES: Final = 20  # lines a second on change, for each publisher
+MOST_CHANGES: Final = 20  # messages a second on change, for each publisher
 WINDOW: Final = 1.0  # s
-RETRY: Final = 0.02  # s until a busy publisher is asked again
+RETRY: Final = 0.02  # s until a busy publisher is tried again
 
 
 class _Output:
-    """One publisher and what it was given."""
+    """One publisher, and what was published to it."""
 
     __slots__ = ("changes", "last", "publisher", "sent", "skipped", "waiting")
 
     def __init__(self, publisher: Publisher, start: float) -> None:
         self.publisher = publisher
         self.last = start
-        """The time of the last periodic message: it keeps the phase."""
+        """When the last periodic message was due; it keeps the phase."""
         self.sent: tuple[RobotStatus, Detail] | None = None
         self.changes: deque[float] = deque(maxlen=MOST_CHANGES)
         self.waiting = False
@@ -59,32 +56,37 @@ class IndustrialRobotStatusController:
         self._outputs: list[_Output] = []
 
     def init(self, hw: InterfaceManager, parameters: Mapping[str, object], publishers: Sequence[Publisher]) -> None:
-        """Read the parameters and find the handle; each default that is used is announced in the log.
+        """Read the parameters and find the handle. The log names each default that is used.
 
-        Raises UnknownHandleError if no handle of that name is registered.
+        Raises ConfigError for a parameter of the wrong type, UnknownHandleError if no handle has that name.
         """
         rate = parameters.get("publish_rate")
         if rate is None:
             log.info("'publish_rate' not set, using default: %g Hz", DEFAULT_PUBLISH_RATE)
         else:
-            self.publish_rate = float(rate)  # type: ignore[arg-type]
+            self.publish_rate = _number(rate)
         name = parameters.get("handle_name")
         if name is None:
             name = DEFAULT_HANDLE_NAME
             log.info("'handle_name' not set, using default: '%s'", name)
-        self.publish_on_change = bool(parameters.get("publish_on_change", True))
-        self.handle = hw.get(IndustrialRobotStatusInterface).get_handle(str(name))
+        elif not isinstance(name, str):
+            raise ConfigError(f"handle_name: must be a text, not {name!r}")
+        on_change = parameters.get("publish_on_change", True)
+        if not isinstance(on_change, bool):
+            raise ConfigError(f"publish_on_change: must be true or false, not {on_change!r}")
+        self.publish_on_change = on_change
+        self.handle = hw.get(IndustrialRobotStatusInterface).get_handle(name)
         self._publishers = publishers
 
     def starting(self, time: Instant) -> None:
-        """Begin to publish: the first periodic message is due one period after `time`."""
+        """Start publishing. The first periodic message is due one period after `time`."""
         self._outputs = [_Output(publisher, time.mono) for publisher in self._publishers]
 
     def update(self, time: Instant, period: float) -> None:
         """Publish what is due at `time`. `period` (seconds since the last update) is ros_control's; it is not used.
 
-        ORIGINAL: publishes periodically only. A change is published at once, at most 20 times a second, so that a
-        reader need not wait for the next period; it does not move the periodic phase.
+        ORIGINAL: publishes periodically only. Here a change is published at once, at most 20 times a second. It does
+        not move the periodic phase.
         """
         handle = self.handle
         now = time.mono
@@ -116,20 +118,20 @@ class IndustrialRobotStatusController:
             output.publisher.publish(msg)
 
     def stopping(self, time: Instant) -> None:
-        """End publishing. What was skipped is told in the log."""
+        """Stop publishing. The log gives the number of skipped messages."""
         skipped = sum(output.skipped for output in self._outputs)
         if skipped:
             log.warning("%s: an output was busy %d times, and messages were skipped", self.handle.name, skipped)
         self._outputs = []
 
     def skipped(self, publisher: Publisher) -> int:
-        """How often a message was due, and this publisher was busy; since `starting`."""
+        """How often this publisher was busy when a message was due, since `starting`."""
         return sum(output.skipped for output in self._outputs if output.publisher is publisher)
 
     def next_due(self, now: float) -> float:
-        """The time (monotonic seconds) at which `update` has something to do, if the handle does not change before.
+        """When (monotonic seconds) `update` has something to do, unless the handle changes first.
 
-        Asked after each `update`; there is none before that time unless the handle changes.
+        The gateway calls this after each `update`, and calls `update` again at that time or when the handle changes.
         """
         due = math.inf
         for output in self._outputs:
@@ -150,10 +152,17 @@ class IndustrialRobotStatusController:
         """The next period begins where this one was due, not where it was published."""
         period = 1 / self.publish_rate
         output.last += period
-        # ORIGINAL: goes on by one period only, so a stall is followed by a burst of all the messages missed.
+        # ORIGINAL: advances by one period only, so a burst of all missed messages follows a stall.
         if output.last + period < now:
             output.last = now - math.fmod(now - output.last, period)
 
     def _may_change(self, output: _Output, now: float) -> bool:
         changes = output.changes
         return len(changes) < MOST_CHANGES or now >= changes[0] + WINDOW
+
+
+def _number(rate: object) -> float:
+    """The parameter `publish_rate`. Raises ConfigError."""
+    if isinstance(rate, int | float) and not isinstance(rate, bool) and abs(rate) <= sys.float_info.max:
+        return float(rate)
+    raise ConfigError(f"publish_rate: must be a number of Hz, not {rate!r}")

@@ -1,6 +1,6 @@
 """The `demo` command: a fake rover and the real gateway in one process, over UDP loopback.
 
-The story's notes go to the log (standard error), the statuses as JSON lines to standard output, as they change.
+The notes of the scenario go to the log (standard error), each change of a status to standard output as a JSON line.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import logging
 from typing import TYPE_CHECKING, Final
 
 from .config import Config, LinkConfig, PublisherConfig
-from .gateway.live import Live
-from .gateway.plant import DEFAULT_CONTROLLER
-from .link.udp import UdpLink
+from .gateway.controller_config import DEFAULT_CONTROLLER
+from .gateway.event_loop import EventLoop
+from .links.udp import UdpLink
 from .testing import DEMO, FakeAutopilot
 
 if TYPE_CHECKING:
@@ -37,16 +37,16 @@ def run_demo(
     speed: float = 1.0,
     controllers: tuple[ControllerConfig, ...] = (DEMO_CONTROLLER,),
 ) -> None:
-    """Play the scenario once, or for ever; SIGINT and SIGTERM end it. `speed` is that of the story's steps."""
-    # port 0: the kernel picks a free one, so that the demo runs beside whatever else does
+    """Play the scenario once, or in a loop until SIGINT or SIGTERM. `speed` is the speed of its steps."""
+    # port 0: the kernel picks a free port
     config = Config(links=(LinkConfig("udpin:127.0.0.1:0"),), controllers=controllers)
-    gateway = Live(config, stdout)
+    gateway = EventLoop(config, stdout)
     gateway.stop_on_signals()
-    link = gateway.stations[0].link
+    link = gateway.endpoints[0].link
     assert isinstance(link, UdpLink)
-    with FakeAutopilot(scenario, to=("127.0.0.1", link.port), loop=loop, speed=speed, on_note=_tell) as autopilot:
+    with FakeAutopilot(scenario, to=("127.0.0.1", link.port), loop=loop, speed=speed, on_note=_log_note) as autopilot:
         gateway.run(until=lambda: autopilot.finished)
 
 
-def _tell(step: Step) -> None:
+def _log_note(step: Step) -> None:
     log.info("%5.1f s  %s", step.at, step.note)

@@ -1,36 +1,36 @@
-"""The errors that a person can act on. Each message says in one line what, where, and what would be right.
+"""The errors that a user can act on. Each message says in one line what is wrong, where, and what is expected.
 
-Nothing that a peer sends ends up here: bad frames are counted.
+A peer never causes one of these: bad frames are counted.
 """
 
 from __future__ import annotations
 
 
 class MavRobotStatusError(Exception):
-    """The root: `cli` prints it as one line and exits with `exit_code`."""
+    """The base class: `cli` prints it as one line and exits with `exit_code`."""
 
     exit_code = 1
 
 
 class LinkError(MavRobotStatusError):
-    """A link or an output failed for good: a port is taken, a permission is missing."""
+    """A link or an output failed permanently: a port is in use, a permission is missing."""
 
 
 class NothingHeardError(MavRobotStatusError):
-    """A question about a vehicle, and none was heard."""
+    """A command needs a vehicle, and no heartbeat was received."""
 
 
 class UsageError(MavRobotStatusError):
-    """The command line, a connection string, a missing log file."""
+    """An error in the command line, a connection string or an option; a missing log file."""
 
     exit_code = 2
 
 
 class ConfigError(UsageError):
-    """The configuration; the message starts with `file:line:column:` where there is a file."""
+    """An error in the configuration. The message starts with `file:line:column:` if there is a file."""
 
 
 class UnknownHandleError(MavRobotStatusError):
-    """A name under which no handle is registered; the message lists the names there are."""
+    """No handle has this name. The message lists the registered names."""
 
     exit_code = 2

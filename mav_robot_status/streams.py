@@ -1,13 +1,14 @@
-"""The standard streams: whatever they lead to, or no longer lead to, the command ends in order and never waits."""
+"""The standard streams. The command never blocks on them, and ends cleanly when a reader closes its end."""
 
 from __future__ import annotations
 
 import contextlib
+import io
 import logging
 import os
 import select
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from typing import TextIO
@@ -16,13 +17,16 @@ if TYPE_CHECKING:
 else:
     Handler = logging.StreamHandler
 
+NO_OUTPUT: Final = io.StringIO()
+"""The standard output for a pipeline without a publisher that writes to it."""
+
 
 class StderrHandler(Handler):
-    """The log on standard error: if nobody reads it lines are lost, and the gateway goes on."""
+    """The log on standard error. A full pipe loses lines; it does not block the gateway."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write the line if there is room for it."""
-        with contextlib.suppress(OSError, ValueError):  # a stream without a descriptor is written to as it is
+        """Write the line if the pipe has room."""
+        with contextlib.suppress(OSError, ValueError):  # a stream without a descriptor is written directly
             descriptor = self.stream.fileno()
             poll = select.poll()
             poll.register(descriptor, select.POLLOUT)
@@ -32,7 +36,7 @@ class StderrHandler(Handler):
 
 
 def complain(line: str) -> None:
-    """One line for the person, if there is one who reads."""
+    """Print one line on standard error, unless its reader is gone."""
     try:
         print(line, file=sys.stderr, flush=True)  # noqa: T201
     except OSError:
@@ -40,7 +44,7 @@ def complain(line: str) -> None:
 
 
 def detach(stream: TextIO) -> None:
-    """Lead a stream whose reader has gone to nowhere, or the interpreter would complain when it ends."""
+    """Redirect a stream without a reader to /dev/null. Otherwise the interpreter reports an error at exit."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -48,7 +52,7 @@ def detach(stream: TextIO) -> None:
 
 
 def open_missing() -> None:
-    """Standard streams that were closed before the start (`>&-`) lead nowhere, before a socket gets their number."""
+    """Open standard streams that were closed at the start (`>&-`), before a socket gets their descriptor."""
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             nowhere = os.open(os.devnull, os.O_RDWR)

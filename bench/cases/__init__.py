@@ -1,1 +1,1 @@
-"""What is measured, one module a case."""
+"""The cases, one module each."""

@@ -1,4 +1,4 @@
-"""Forwarding from one UDP port to another, beside the status."""
+"""Forwarding from one UDP port to another while publishing the status."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def measure(bench: Bench) -> Found:
 
 
 def _alone(bench: Bench) -> Iterator[tuple[int, float]]:
-    """What our status costs without forwarding."""
+    """CPU time per frame of our status without forwarding, for each rate."""
     port = free_port()
     with bench.contenders.start_ours(port, "--json", "none") as child, Feed(bench.frames(), port) as feed:
         child.listens(port)
@@ -59,7 +59,7 @@ def _alone(bench: Bench) -> Iterator[tuple[int, float]]:
 
 
 class _Sink:
-    """Where frames are forwarded to. Nobody reads it: what arrives is counted from its queue and the kernel's drops."""
+    """The target of the forwarding. Datagrams are counted afterwards, from its queue and the kernel's drop counter."""
 
     def __init__(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

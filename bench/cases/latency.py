@@ -1,4 +1,4 @@
-"""From a HEARTBEAT that is armed, or no longer, to the JSON line that says so, with nothing else to do."""
+"""Time from a HEARTBEAT that changes `armed` to the JSON line with the change, without other load."""
 
 from __future__ import annotations
 
@@ -43,19 +43,19 @@ def measure(bench: Bench) -> Found:
 
 
 def _times(child: Child, port: int, armed: Callable[[dict[str, Any]], Any], number: int) -> list[float]:
-    """Microseconds from sending to reading, one for each change."""
+    """Microseconds from sending to reading, for each change."""
     mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
     lines = _Lines(child)
     times = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         out.connect(("127.0.0.1", port))
-        for i in range(number + 10):  # the first ten only warm up
-            wish = i % 2 == 0
-            beat = dialect.MAVLink_heartbeat_message(10, 3, 209 if wish else 81, 0, 4 if wish else 3, 3).pack(mav)
+        for i in range(number + 10):  # the first ten are a warm-up
+            arm = i % 2 == 0
+            heartbeat = dialect.MAVLink_heartbeat_message(10, 3, 209 if arm else 81, 0, 4 if arm else 3, 3).pack(mav)
             mav.seq = (mav.seq + 1) & 255
             start = time.perf_counter()
-            out.send(beat)
-            while armed(lines.read()) is not wish:
+            out.send(heartbeat)
+            while armed(lines.read()) is not arm:
                 pass
             if i >= 10:
                 times.append((time.perf_counter() - start) * 1e6)
@@ -65,7 +65,7 @@ def _times(child: Child, port: int, armed: Callable[[dict[str, Any]], Any], numb
 
 
 class _Lines:
-    """The JSON lines of a child, without waiting forever for one."""
+    """The JSON lines of a child. Reading times out."""
 
     def __init__(self, child: Child) -> None:
         assert child.process.stdout is not None
@@ -82,7 +82,7 @@ class _Lines:
         return found
 
     def skip(self) -> None:
-        """Periodic lines that came meanwhile."""
+        """Discard the periodic lines that have arrived."""
         while select.select([self._descriptor], [], [], 0)[0]:
             self._rest += os.read(self._descriptor, 1 << 16)
         self._rest = b""

@@ -1,4 +1,4 @@
-"""Resident memory after the frames of a minute, and its growth over many more."""
+"""Resident memory after the frames of a minute, and its growth over many more frames."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RATE = 400  # frames/s: the minute takes twelve seconds
 FAST = 16_000
 FRAMES, LONG = 400_000, 10_000_000
 SETTLED = 50_000
-"""Frames after which growth is counted: by then every cache is as full as it gets."""
+"""Frames before the growth is measured. After them every cache is full."""
 
 
 def measure(bench: Bench) -> Found:

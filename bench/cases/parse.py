@@ -1,4 +1,4 @@
-"""Parsing from memory: each known frame's CRC checked, lost frames counted."""
+"""Parsing from memory. Both parsers check the CRC of each known frame and count lost frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ METRIC = "CPU per frame, us"
 
 
 def job(name: str, path: object, size: int = 0) -> float:
-    """CPU time per frame, microseconds, of one job of `peers/in_memory.py` in a process of its own."""
+    """CPU time per frame, in microseconds, of one job of `peers/in_memory.py`. The job has its own process."""
     command = [sys.executable, str(PEERS / "in_memory.py"), name, str(path), str(size)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
     if done.returncode:

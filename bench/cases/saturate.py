@@ -15,9 +15,9 @@ SETUP = "one frame a datagram"
 RATE, CPU = "highest lossless rate, frames/s", "CPU per frame there, us"
 FIRST = 500  # frames/s
 HIGHEST = 1_024_000
-FINE = 1.1  # the search ends when the bounds are that close
-TRIES = 2  # so often a rate is tried if frames are lost or the sender was slow: others use the machine too
-BEHIND = 0.1  # of the time of sending: what takes longer to be read only found room in the socket's queue
+FINE = 1.1  # the search ends at this ratio of the bounds
+TRIES = 2  # attempts at a rate if frames are lost or the sender is slow: other programs use the machine too
+BEHIND = 0.1  # fraction of the sending time; a longer delay means that frames only fill the socket's queue
 SECONDS = 2.0
 
 
@@ -35,7 +35,7 @@ def measure(bench: Bench) -> Found:
             skipped.append(Skip("", who, str(error)))
             continue
         if best is None:
-            skipped.append(Skip(SETUP, who, f"loses frames at {FIRST} frames/s already"))
+            skipped.append(Skip(SETUP, who, f"already loses frames at {FIRST} frames/s"))
             continue
         limit = f"the sender's limit was {best.rate:,.0f} frames/s" if best.slow_sender else ""
         yield Sample(SETUP, RATE, who, best.rate, limit)
@@ -44,7 +44,7 @@ def measure(bench: Bench) -> Found:
 
 
 def _search(child: Child, feed: Feed, seconds: float) -> Fed | None:
-    """Double the rate until frames are lost, then halve the interval, on a scale of ratios."""
+    """Double the rate until frames are lost, then bisect on a logarithmic scale."""
     best: Fed | None = None
     rate, low, high = float(FIRST), 0.0, math.inf
     while high / max(low, 1.0) > FINE:

@@ -1,4 +1,4 @@
-"""A link whose frames are all signed, beside the same traffic without signatures."""
+"""A link with only signed frames, compared with the same traffic without signatures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def measure(bench: Bench) -> Found:
     """One round."""
     has = bench.contenders.has_option("--signing-key")
     if not has:
-        yield Skip(SIGNED, OURS, "this version has no option --signing-key")
+        yield Skip(SIGNED, OURS, "this version lacks the option --signing-key")
     key_file = bench.place / "signing.key"
     key_file.write_text(KEY.hex() + "\n")
     key_file.chmod(0o600)
@@ -33,7 +33,7 @@ def measure(bench: Bench) -> Found:
 
 def _one(bench: Bench, setup: str, who: str, arguments: tuple[str, ...]) -> Found:
     seconds = bench.lasting(SECONDS)
-    # a signed frame is taken once only, so there is one for everything that is sent
+    # a receiver accepts a signed frame only once, so the file has one for every frame that is sent
     frames = bench.place / "signed.frames"
     if setup == SIGNED:
         workload.save(frames, workload.frames(round(RATE * (seconds + 1)), key=KEY))

@@ -1,4 +1,4 @@
-"""From the start of the process to its first JSON line, with a heartbeat waiting all the time."""
+"""Time from the start of the process to its first JSON line. A heartbeat is always waiting."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ def measure(bench: Bench) -> Found:
     starts = {OURS: bench.contenders.start_ours, PYMAVLINK: bench.contenders.start_pymavlink}
     for who, start in starts.items():
         port = free_port()
-        with _Beats(port):
+        with _Heartbeats(port):
             began = time.perf_counter()
             with start(port, pipe=True) as child:
                 assert child.process.stdout is not None
                 if not child.process.stdout.readline():
-                    raise BenchError(f"{who} ended without a line: {child.stop()}")
+                    raise BenchError(f"{who} has ended without a JSON line: {child.stop()}")
                 took = time.perf_counter() - began
                 yield Sample(SETUP, WALL, who, took * 1000)
                 yield Sample(SETUP, CPU, who, child.cpu() * 1000)
 
 
-class _Beats:
+class _Heartbeats:
     """Heartbeats to a port, from a thread."""
 
     def __init__(self, port: int) -> None:
@@ -54,7 +54,7 @@ class _Beats:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
             out.connect(("127.0.0.1", self._port))
             while not self._stop.wait(EVERY):
-                with contextlib.suppress(OSError):  # nobody is there yet
+                with contextlib.suppress(OSError):  # the receiver does not listen yet
                     out.send(dialect.MAVLink_heartbeat_message(10, 3, 81, 0, 3, 3).pack(mav))
                     mav.seq = (mav.seq + 1) & 255
 

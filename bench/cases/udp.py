@@ -1,4 +1,4 @@
-"""UDP to status at steady rates, one frame a datagram, with everyone's defaults."""
+"""UDP to status at steady rates, one frame a datagram. Every program has its default options."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ def measure(bench: Bench) -> Found:
                     fed = feed.measure(child, rate, bench.lasting(SECONDS))
                     yield Sample(f"{rate} frames/s", METRIC, who, fed.per_frame, fed.note)
                 if who in (OURS, COALESCING):
-                    yield Sample("all of them", READ, who, 100 * _frames_told(child.stop()) / feed.total)
+                    yield Sample("all of them", READ, who, 100 * _logged_frames(child.stop()) / feed.total)
         except BenchError as error:
             skipped.append(Skip("", who, str(error)))
     yield from skipped
 
 
-def _frames_told(log: str) -> int:
-    """What our closing line says."""
+def _logged_frames(log: str) -> int:
+    """The number of frames in the log line that our command writes when it ends."""
     found = re.search(r": (\d+) frames, \d+ lost", log)
     if found is None:
-        raise BenchError(f"no closing line: {log[-300:]}")
+        raise BenchError(f"no log line with the number of frames: {log[-300:]}")
     return int(found[1])
 
 

@@ -1,1 +1,1 @@
-"""Child programs: each does one job with one library, so that nothing but that job is in its CPU time."""
+"""Child programs. Each does one job with one library, so that its CPU time contains only that job."""

@@ -1,4 +1,4 @@
-"""CPU time from memory, as JSON. Arguments: JOB FILE SIZE. Nothing but the job is imported and timed.
+"""CPU time of a job that reads from memory, as JSON. Arguments: JOB FILE SIZE. Imports and times only that job.
 
 Jobs: parse frames of a file of `workload.save`, in pieces of SIZE bytes (0: frame by frame); or replay a log.
 """
@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-REPEAT: Final = 8  # times over the loop of frames
+REPEAT: Final = 8  # passes over the frames
 
 
 def parse_ours(pieces: list[bytes], _: str) -> Callable[[], int]:
-    """Our parser with what a status needs; loss is tracked, each known frame's CRC checked."""
-    from mav_robot_status.hardware.kinds import WANTED_IDS
+    """Our parser with the messages of a status. It counts lost frames and checks the CRC of each known frame."""
+    from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
     from mav_robot_status.mavlink.framing import Parser
 
     parser = Parser(WANTED_IDS)
@@ -39,7 +39,7 @@ def parse_ours(pieces: list[bytes], _: str) -> Callable[[], int]:
 
 
 def parse_pymavlink(pieces: list[bytes], _: str) -> Callable[[], int]:
-    """pymavlink's parser with the dialect that mavutil takes."""
+    """pymavlink's parser with the default dialect of mavutil."""
     from pymavlink.dialects.v20 import ardupilotmega
 
     mav = ardupilotmega.MAVLink(None)
@@ -58,16 +58,16 @@ def replay_ours(_: list[bytes], path: str) -> Callable[[], int]:
     import re
 
     from mav_robot_status.config import Config
-    from mav_robot_status.gateway.plant import DEFAULT_CONTROLLER
+    from mav_robot_status.gateway.controller_config import DEFAULT_CONTROLLER
     from mav_robot_status.gateway.replay import replay
 
     silent = dataclasses.replace(DEFAULT_CONTROLLER, parameters={"publish_rate": 0}, publishers=())
-    said = StringIO()
-    logging.basicConfig(level=logging.INFO, stream=said)
+    output = StringIO()
+    logging.basicConfig(level=logging.INFO, stream=output)
 
     def run() -> int:
         replay(Config(controllers=(silent,)), path, StringIO())
-        found = re.search(r": (\d+) frames", said.getvalue())
+        found = re.search(r": (\d+) frames", output.getvalue())
         assert found is not None
         return int(found[1])
 
@@ -101,7 +101,7 @@ JOBS: Final[dict[str, Callable[[list[bytes], str], Callable[[], int]]]] = {
 
 
 def pieces_of(path: str, size: int) -> list[bytes]:
-    """The frames of a file, as they are to be read."""
+    """The frames of a file, one by one or in pieces of `size` bytes."""
     data = Path(path).read_bytes()
     frames = []
     at = 0
@@ -114,7 +114,7 @@ def pieces_of(path: str, size: int) -> list[bytes]:
 
 
 def main() -> None:
-    """Do one job and say how many frames it was and what it took."""
+    """Do one job. Print the number of frames and the CPU time."""
     job, path, size = sys.argv[1], sys.argv[2], int(sys.argv[3])
     run: Any = JOBS[job](pieces_of(path, size) if job.startswith("parse") else [], path)
     start = time.process_time()

@@ -10,7 +10,7 @@ from pymavlink import mavutil
 
 
 def main() -> None:
-    """Go on until stopped."""
+    """Run until stopped."""
     link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{sys.argv[1]}", dialect="ardupilotmega")
     out = mavutil.mavlink_connection(f"udpout:127.0.0.1:{sys.argv[2]}", dialect="ardupilotmega")
     while True:

@@ -1,4 +1,4 @@
-"""UDP to JSON lines with pymavlink, as its users write it: `recv_match` in a loop. Arguments: PORT [RATE [KEY]]."""
+"""UDP to JSON lines with pymavlink, as users write it: `recv_match` in a loop. Arguments: PORT [RATE [KEY]]."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KINDS = [
 
 
 def main() -> None:
-    """Go on until stopped."""
+    """Run until stopped."""
     rate = float(sys.argv[2]) if len(sys.argv) > 2 else 10.0
     link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{sys.argv[1]}", dialect="ardupilotmega")
     if len(sys.argv) > 3:
@@ -30,13 +30,13 @@ def main() -> None:
         message = link.recv_match(type=KINDS, blocking=True, timeout=wait)
         armed = status["armed"]
         if message is not None:
-            _take(status, message)
+            _update(status, message)
         if rate and (time.monotonic() >= due or status["armed"] != armed) and status["armed"] is not None:
             print(json.dumps({"stamp": time.time(), **status}), flush=True)
             due = max(due + 1 / rate, time.monotonic())
 
 
-def _take(status: dict[str, Any], message: Any) -> None:
+def _update(status: dict[str, Any], message: Any) -> None:
     kind = message.get_type()
     if kind == "HEARTBEAT":
         status["armed"] = bool(message.base_mode & 128)

@@ -1,7 +1,7 @@
-"""What the command can do: a row of `COMMANDS` and a module of the same name for each.
+"""The subcommands: a row of `COMMANDS` and a module of the same name for each.
 
-A command's module is imported when it is asked for and not before, and what it needs when it runs. Beside them:
-`options` are what several commands let a person say, `overrides` what is said instead of the configuration.
+The module of a command is imported only for that command, and it imports what it needs when it runs. `options` has the
+arguments that several commands share; `overrides` applies them to the configuration.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ if TYPE_CHECKING:
 
 PROGRAM: Final = "mav-robot-status"
 COMMANDS: Final = {
-    "run": "the main job: statuses of the vehicles heard, as JSON lines and as MAVLink",
-    "explain": "each field with its value, the rule, what it read, and how old that is",
-    "doctor": "why is there no status? what is found on a connection, and the one next action",
-    "report": "recorded logs as a picture: one HTML file that needs nothing else",
-    "watch": "a live table in the terminal; ? there tells the keys",
-    "board": "all robots of an MQTT broker on one web page",
-    "demo": "a fake autopilot and the gateway in one process; about 30 s",
-    "check-config": "what a configuration means, or where its fault is",
-    "dialect": "write the dialect's XML, and Lua for Wireshark",
+    "run": "publish the statuses of all vehicles heard, as JSON lines and as MAVLink (the default)",
+    "explain": "show each field with its value, the rule, the message that it read and its age",
+    "doctor": "find out why there is no status, and what to do next",
+    "report": "draw recorded logs as one self-contained HTML file",
+    "watch": "show a live table in the terminal; press ? for the keys",
+    "board": "show all robots of an MQTT broker on one web page",
+    "demo": "run a fake autopilot and the gateway in one process; about 30 s",
+    "check-config": "explain a configuration, or show where its error is",
+    "dialect": "write the dialect's XML, and a Lua dissector for Wireshark",
 }
-"""Every command with its line in the help, in the order in which the help shows them."""
+"""Every command with its help line, in the order of the help."""
 
 
 class Command(Protocol):
     """A command's module."""
 
     def arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Add what the command lets a person say."""
+        """Add the arguments of the command."""
 
     def run(self, options: argparse.Namespace) -> int:
-        """Do it; the exit code. Raises MavRobotStatusError."""
+        """Run the command and return its exit code. Raises MavRobotStatusError."""
 
 
 def command(name: str) -> Command:

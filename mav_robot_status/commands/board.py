@@ -1,33 +1,34 @@
-"""All robots of an MQTT broker on one page, until it is ended."""
+"""All robots of an MQTT broker on one page."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
-from .options import broker, verbosity, web
-from .overrides import OF_BROKER, mqtt_options, page_options
+from ..publishers.mqtt.options import BrokerOptions
+from ..publishers.web.options import DEFAULT_LISTEN, HttpOptions
+from .options import given, publisher, verbosity
 
 if TYPE_CHECKING:
     import argparse
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Which broker, and where the page is."""
-    parser.add_argument("broker", metavar="URL", help="what the gateways were given, e.g. mqtts://broker/robots")
-    web(parser)
-    parser.set_defaults(http="127.0.0.1:8765")
-    broker(parser)
+    """The broker, and the address of the page."""
+    parser.add_argument("mqtt", metavar="URL", help="the --mqtt of the gateways, for example mqtts://broker/robots")
+    publisher(parser, HttpOptions)
+    parser.set_defaults(http=DEFAULT_LISTEN)
+    publisher(parser, BrokerOptions, without=("url",))
     verbosity(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Raises UsageError if the extras are not installed."""
-    from ..publishers.mqtt.options import read_broker
-    from ..publishers.web.options import read as read_web
+    from ..publishers.mqtt.settings import read_broker
+    from ..publishers.web.settings import read as read_web
 
-    source = read_broker(mqtt_options(options, options.broker, OF_BROKER))
-    page = read_web(page_options(options))
+    source = read_broker(given(options, BrokerOptions))
+    page = read_web(given(options, HttpOptions))
     try:
         from ..gateway.board import FleetBoard
     except ModuleNotFoundError as error:

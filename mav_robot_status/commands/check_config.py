@@ -1,4 +1,4 @@
-"""Say what a configuration means."""
+"""Explain a configuration."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Which configuration."""
+    """The file."""
     parser.add_argument("file", metavar="FILE")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Raises ConfigError where its fault is."""
-    from ..gateway.plant import check
+    """Print what the configuration means. Raises ConfigError, which names the place of an error."""
+    from ..gateway.controller_config import check
 
     config = load(options.file)
     check(config)

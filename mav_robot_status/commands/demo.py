@@ -5,23 +5,24 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from .options import verbosity, web
-from .overrides import with_page
+from ..publishers.web.options import HttpOptions
+from .options import publisher, verbosity
+from .overrides import with_publisher
 
 if TYPE_CHECKING:
     import argparse
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """How often, and whether with a page."""
+    """Repetition and the web page."""
     parser.add_argument("--loop", action="store_true", help="begin again when it ends")
-    web(parser)
+    publisher(parser, HttpOptions)
     verbosity(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Until the story ends."""
+    """Run until the end of the scenario."""
     from ..demo import DEMO_CONTROLLER, run_demo
 
-    run_demo(sys.stdout, loop=options.loop, controllers=with_page((DEMO_CONTROLLER,), options))
+    run_demo(sys.stdout, loop=options.loop, controllers=with_publisher("http", (DEMO_CONTROLLER,), options))
     return 0

@@ -9,12 +9,12 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Where to."""
-    parser.add_argument("-o", "--output", metavar="DIR", default=".", help="folder to write to (this one)")
+    """The folder."""
+    parser.add_argument("-o", "--output", metavar="DIR", default=".", help="folder to write to (the current one)")
 
 
 def run(options: argparse.Namespace) -> int:
-    """The names of the files on standard output."""
+    """Print the names of the files."""
     from ..mavlink.dialect_files import write_files
 
     for path in write_files(options.output):

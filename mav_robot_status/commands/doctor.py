@@ -1,10 +1,10 @@
-"""Why is there no status?"""
+"""Find out why there is no status."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..link.url import parse
+from ..links.url import parse
 from .options import connections, looking, seconds
 from .overrides import configured
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What to listen to, and how long."""
+    """The connections and the duration."""
     connections(parser, "what to listen to")
     parser.add_argument(
         "--seconds", type=seconds, metavar="S", default=5.0, help="listen so long, from the first heartbeat on (5)"
@@ -23,12 +23,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """0: a status can be had on every connection, 1: not."""
-    from ..gateway.doctor.listen import examine
-    from ..gateway.doctor.report import as_json, as_text
+    """0: every connection has a status; 1: one lacks it."""
+    from ..diagnosis.doctor.listen import examine
+    from ..diagnosis.doctor.rendering import as_json, as_text
 
     config = configured(options)
-    for link in config.links:  # what is no connection shows now, before the first is listened to
+    for link in config.links:  # report an invalid connection before listening
         parse(link.url)
     ok = True
     for link in config.links:

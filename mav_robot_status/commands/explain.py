@@ -1,4 +1,4 @@
-"""Why each field has its value, now or at a moment of a log."""
+"""Show why each field has its value, now or at a time in a log."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from ..errors import NothingHeardError, UsageError
-from ..link.url import parse
+from ..links.url import parse
 from .options import connections, looking
 from .overrides import configured
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What to explain, and when."""
+    """The connections and the time."""
     connections(parser)
     parser.add_argument("--at", metavar="TIME", help="moment of a log: 2026-11-20T18:49:07Z, or +44 (seconds)")
     parser.add_argument("--as-json", action="store_true", help="as JSON, one object for each vehicle")
@@ -23,12 +23,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """A table, or JSON, on standard output."""
-    from ..gateway.explain import as_json, as_table, explain_live, explain_log
+    """Print a table or JSON."""
+    from ..diagnosis.explain import as_json, as_table, explain_live, explain_log
 
     config = configured(options)
     urls = [parse(link.url) for link in config.links]
-    if len(urls) == 1 and urls[0].kind == "log":
+    if len(urls) == 1 and urls[0].kind.is_log:
         found = explain_log(config, urls[0].device, options.at)
     elif options.at is not None:
         raise UsageError("--at is a moment of a recorded log; a live connection is explained now")

@@ -1,60 +1,82 @@
-"""What several commands let a person say on the command line, and the numbers that make sense there."""
+"""Arguments that several commands share, and their number types.
+
+The arguments of our publishers are not written here: the dataclass of a publisher's options declares them.
+"""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+from typing import TYPE_CHECKING, Any
 
-from ..link.url import help_text
+from ..links.url import help_text
+
+if TYPE_CHECKING:
+    from collections.abc import Container
+
+    from ..interface import Options
+
+FORMS = "forms"
+"""A placeholder in a parser for the connection forms: finding every kind of link scans the installed packages."""
 
 
-def connections(parser: argparse.ArgumentParser, what: str = "where MAVLink comes from") -> None:
-    """The connections, whose forms stand at the end of the help."""
-    parser.epilog, parser.formatter_class = help_text(), argparse.RawDescriptionHelpFormatter
+class ConnectionHelp(argparse.RawDescriptionHelpFormatter):
+    """Writes the forms of a connection at the end of the help."""
+
+    def add_text(self, text: str | None) -> None:
+        """Add the forms in place of FORMS."""
+        super().add_text(help_text() if text == FORMS else text)
+
+
+def connections(parser: argparse.ArgumentParser, what: str = "source of MAVLink") -> None:
+    """The connections. The end of the help lists their forms."""
+    parser.epilog, parser.formatter_class = FORMS, ConnectionHelp
     parser.add_argument("connections", nargs="*", metavar="CONNECTION", help=f"{what}; see below")
 
 
-def looking(parser: argparse.ArgumentParser, passive: str = "never send anything on the vehicle links") -> None:
-    """The rest for a command that looks at vehicles and does not pass on what it sees."""
+def looking(parser: argparse.ArgumentParser, passive: str = "never send on the vehicle links") -> None:
+    """The other arguments of a command that reads vehicles and publishes nothing."""
     parser.add_argument("--config", metavar="FILE", help="configuration (YAML)")
     parser.add_argument("--system", type=system, metavar="N", help="only the vehicle with this system id")
     parser.add_argument("--baud", type=baud, metavar="N", help="baud rate of serial connections (57600)")
-    parser.add_argument("--signing-key", metavar="FILE", help="believe only what is signed with this key")
+    parser.add_argument("--signing-key", metavar="FILE", help="accept only frames signed with this key")
     parser.add_argument("--passive", action="store_true", help=passive)
     verbosity(parser)
 
 
-def web(parser: argparse.ArgumentParser) -> None:
-    """The web page."""
-    parser.add_argument("--http", metavar="HOST:PORT", help="the statuses as a live web page, e.g. on 127.0.0.1:8765")
-    parser.add_argument("--http-token-file", metavar="FILE", help="show the page's data only to who has this token")
-    parser.add_argument("--http-open", action="store_true", help="show them to everybody who can reach HOST:PORT")
+def publisher(parser: argparse.ArgumentParser, options: type[Options], without: Container[str] = ()) -> None:
+    """The arguments of a publisher: one for each option with a flag, except those in `without`."""
+    for name, kind, _, option in options.declared():
+        if option.flag is None or name in without:
+            continue
+        if kind is bool:
+            parser.add_argument(option.flag, action="store_true", help=option.help)
+        else:
+            convert = float if kind is float else str
+            choices = option.choices or None
+            parser.add_argument(option.flag, type=convert, metavar=option.metavar, choices=choices, help=option.help)
 
 
-def broker(parser: argparse.ArgumentParser) -> None:
-    """How to come to an MQTT broker."""
-    parser.add_argument("--mqtt-user", metavar="NAME", help="who we are to the broker")
-    parser.add_argument(
-        "--mqtt-password-file", metavar="FILE", help="the password, unless it is in MAV_ROBOT_STATUS_MQTT_PASSWORD"
-    )
-    parser.add_argument("--mqtt-ca", metavar="FILE", help="authority to believe (PEM), instead of the system's")
-    parser.add_argument("--mqtt-cert", metavar="FILE", help="our own certificate (PEM)")
-    parser.add_argument("--mqtt-key", metavar="FILE", help="its key, if it is not in the same file")
-    parser.add_argument("--mqtt-version", choices=("5", "3.1.1"), help="of the protocol (5)")
-    parser.add_argument(
-        "--mqtt-keepalive", type=float, metavar="S", help="how soon a broken connection is noticed, in seconds (10)"
-    )
+def given(options: argparse.Namespace, declared: type[Options]) -> dict[str, object]:
+    """The options of a publisher that the command line gives, as a configuration writes them."""
+    values = {one.name: value_of(options, one.option.flag) for one in declared.declared() if one.option.flag}
+    return {name: value for name, value in values.items() if value is not None and value is not False}
+
+
+def value_of(options: argparse.Namespace, flag: str) -> Any:
+    """The value of `--a-flag` on the command line; None if the command lacks it."""
+    return getattr(options, flag.strip("-").replace("-", "_"), None)
 
 
 def verbosity(parser: argparse.ArgumentParser) -> None:
-    """How much is logged; a command without it logs nothing."""
+    """How much is logged. A command without these arguments logs nothing."""
     group = parser.add_mutually_exclusive_group()
-    group.add_argument("-v", "--verbose", action="store_true", help="more in the log")
-    group.add_argument("-q", "--quiet", action="store_true", help="only warnings in the log")
+    group.add_argument("-v", "--verbose", action="store_true", help="log more")
+    group.add_argument("-q", "--quiet", action="store_true", help="log warnings only")
 
 
 def rate(text: str) -> float:
-    """Hz; 0 and below for none. Raises ArgumentTypeError, as the others do."""
+    """Hz; 0 or less for none. Raises ArgumentTypeError, like the functions below."""
     with contextlib.suppress(ValueError):
         if abs(hertz := float(text)) <= 1000:
             return hertz
@@ -62,11 +84,11 @@ def rate(text: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """How long to listen, up to an hour."""
+    """Seconds to listen, at most an hour."""
     with contextlib.suppress(ValueError):
         if 0 < (duration := float(text)) <= 3600:
             return duration
-    raise argparse.ArgumentTypeError(f"{text!r} is no time to listen; write a number of seconds up to 3600")
+    raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 3600")
 
 
 def system(text: str) -> int:

@@ -1,4 +1,4 @@
-"""What the command line says instead of the configuration."""
+"""The command line overrides the configuration."""
 
 from __future__ import annotations
 
@@ -9,49 +9,52 @@ from typing import Final
 from ..config import Config, ControllerConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
 from ..config import load as load_config
 from ..errors import UsageError
-from ..interface import DEFAULT_HANDLE_NAME
-from ..link.url import parse
+from ..interface import DEFAULT_HANDLE_NAME, Options
+from ..links.url import parse
+from ..publishers.json_lines import JsonOptions
+from ..publishers.mqtt.options import MqttOptions
+from ..publishers.web.options import HttpOptions
 from . import PROGRAM
+from .options import given, value_of
 
-OF_PAGE: Final = ("token_file", "open")
-"""Options of `--http`."""
-OF_BROKER: Final = ("user", "password_file", "ca", "cert", "key", "version", "keepalive")
-"""Options of `--mqtt` that the board has too."""
-OF_MQTT: Final = (*OF_BROKER, "robot", "spool")
-OF_RUN: Final = (
-    "out", "rate", "changes_only", "json", "format", "record", "forward",
-    "http", *(f"http_{name}" for name in OF_PAGE), "mqtt", *(f"mqtt_{name}" for name in OF_MQTT),
-)  # fmt: skip
-"""Options that only `run` has of those that override the configuration."""
+WITH_ARGUMENTS: Final[dict[str, type[Options]]] = {"http": HttpOptions, "mqtt": MqttOptions}
+"""The publishers that the command line adds: each replaces the publishers of its type in the configuration."""
+
+
+BESIDE_MAVLINK: Final = ("run", "watch", "explain")
+"""Commands that need no connection if the configuration has a hardware interface other than MAVLink."""
 
 
 def loaded(options: Namespace) -> Config:
-    """The configuration of the file; without one what is in force then. Raises ConfigError."""
+    """The configuration of the file, or the default one. Raises ConfigError."""
     return load_config(options.config) if options.config else Config()
 
 
 def configured(options: Namespace) -> Config:
     """The configuration of a command that needs connections, overridden. Raises UsageError if there are none."""
     config = overridden(loaded(options), options)
-    if not config.links:
+    if not config.links and not (config.interfaces and options.command in BESIDE_MAVLINK):
         asked = PROGRAM if options.command == "run" else f"{PROGRAM} {options.command}"
         raise UsageError(f"no connection given; write for example {asked} udp:127.0.0.1:14550")
     return config
 
 
 def overridden(config: Config, options: Namespace) -> Config:
-    """The configuration with what the command line says instead."""
-    options = Namespace(**{**dict.fromkeys(OF_RUN), **vars(options)})
+    """The configuration with the options of the command line."""
     if options.system is not None:
         config = only(config, options.system)
+    controllers = _controllers(config, options)
+    for kind in WITH_ARGUMENTS:
+        controllers = with_publisher(kind, controllers, options)
+    record = value_of(options, "--record")
     return dataclasses.replace(
         config,
         links=_links(config, options),
         outs=_outs(config, options),
-        controllers=_with_mqtt(with_page(_controllers(config, options), options), options),
+        controllers=controllers,
         signing=_signing(config.signing, options.signing_key),
-        record=config.record if options.record is None else options.record,
-        forward=config.forward or bool(options.forward),
+        record=config.record if record is None else record,
+        forward=config.forward or bool(value_of(options, "--forward")),
     )
 
 
@@ -65,24 +68,21 @@ def only(config: Config, system: int) -> Config:
     return dataclasses.replace(config, vehicles=vehicles, controllers=controllers)
 
 
-def with_page(controllers: tuple[ControllerConfig, ...], options: Namespace) -> tuple[ControllerConfig, ...]:
-    """The controllers with the web page of the command line, instead of one in the configuration."""
-    if options.http is None:
-        _refuse("http", OF_PAGE, options, "is for a web page: add --http 127.0.0.1:8765")
-        return controllers
-    return _with(controllers, PublisherConfig("http", page_options(options)))
+def with_publisher(
+    kind: str, controllers: tuple[ControllerConfig, ...], options: Namespace
+) -> tuple[ControllerConfig, ...]:
+    """The controllers with the publisher of the command line, which replaces those of its type.
 
-
-def page_options(options: Namespace) -> dict[str, object]:
-    """The options of an http publisher, as the configuration writes them."""
-    given = {name: getattr(options, f"http_{name}") for name in OF_PAGE}
-    return {"listen": options.http, **{name: value for name, value in given.items() if value}}
-
-
-def mqtt_options(options: Namespace, url: str, names: tuple[str, ...] = OF_MQTT) -> dict[str, object]:
-    """The options of an mqtt publisher, as the configuration writes them."""
-    given = {name: getattr(options, f"mqtt_{name}") for name in names}
-    return {"url": url, **{name: value for name, value in given.items() if value is not None}}
+    The first flag of its options enables it. Raises UsageError for another of its flags without the first.
+    """
+    first, *others = (one.option for one in WITH_ARGUMENTS[kind].declared() if one.option.flag is not None)
+    asked = given(options, WITH_ARGUMENTS[kind])
+    if value_of(options, str(first.flag)) is not None:
+        return _with(controllers, PublisherConfig(kind, asked))
+    for option in others:
+        if value_of(options, str(option.flag)):
+            raise UsageError(f"{option.flag} needs {first.flag} {first.metavar}: {first.help}")
+    return controllers
 
 
 def _links(config: Config, options: Namespace) -> tuple[LinkConfig, ...]:
@@ -96,14 +96,15 @@ def _links(config: Config, options: Namespace) -> tuple[LinkConfig, ...]:
 
 def _with_baud(url: str, baud: int) -> str:
     parsed = parse(url, baud)
-    return f"{parsed.device},{parsed.baud}" if parsed.kind == "serial" else url
+    return f"{parsed.device},{parsed.baud}" if parsed.kind.is_serial else url
 
 
 def _outs(config: Config, options: Namespace) -> tuple[LinkConfig, ...]:
-    outs = tuple(LinkConfig(url) for url in options.out) if options.out else config.outs
+    urls = value_of(options, "--out")
+    outs = tuple(LinkConfig(url) for url in urls) if urls else config.outs
     for out in outs:
-        if parse(out.url).kind == "log":
-            raise UsageError(f"{out.url!r} is a log, and an out is sent to: write one like udpout:192.168.1.20:14550")
+        if parse(out.url).kind.is_log:
+            raise UsageError(f"{out.url!r} is a log, and an out needs a receiver: write udpout:192.168.1.20:14550")
     return outs
 
 
@@ -114,18 +115,16 @@ def _signing(section: SigningConfig | None, key_file: str | None) -> SigningConf
 
 
 def _controllers(config: Config, options: Namespace) -> tuple[ControllerConfig, ...]:
-    """The controllers with the command line's rate and JSON options; none if nothing differs from the default."""
-    json_options: dict[str, object] = {}
-    if options.json not in (None, "none"):
-        json_options["path"] = options.json
-    if options.format is not None:
-        json_options["format"] = options.format
-    if options.changes_only:
-        json_options["changes_only"] = True
-    rate = {} if options.rate is None else {"publish_rate": options.rate}
-    if not (rate or json_options or options.json == "none"):
+    """The controllers with the rate and the JSON options of the command line."""
+    json_options = given(options, JsonOptions)
+    path = json_options.get("path")
+    if path == "none":
+        del json_options["path"]
+    hertz = value_of(options, "--rate")
+    rate = {} if hertz is None else {"publish_rate": hertz}
+    if not (rate or json_options or path == "none"):
         return config.controllers
-    from ..gateway.plant import DEFAULT_CONTROLLER, DEFAULT_PUBLISHERS
+    from ..gateway.controller_config import DEFAULT_CONTROLLER, DEFAULT_PUBLISHERS
 
     changed = []
     for controller in config.controllers or (DEFAULT_CONTROLLER,):
@@ -137,34 +136,19 @@ def _controllers(config: Config, options: Namespace) -> tuple[ControllerConfig, 
                 publishers=tuple(
                     PublisherConfig(p.type, {**p.options, **json_options}) if p.type == "json" else p
                     for p in publishers
-                    if p.type != "json" or options.json != "none"
+                    if p.type != "json" or path != "none"
                 ),
             )
         )
-    if options.json not in (None, "none") and not any(p.type == "json" for c in changed for p in c.publishers or ()):
+    if path not in (None, "none") and not any(p.type == "json" for c in changed for p in c.publishers or ()):
         asked = PublisherConfig("json", json_options)
         return tuple(dataclasses.replace(c, publishers=(asked, *(c.publishers or ()))) for c in changed)
     return tuple(changed)
 
 
-def _with_mqtt(controllers: tuple[ControllerConfig, ...], options: Namespace) -> tuple[ControllerConfig, ...]:
-    """The controllers with the broker of the command line, instead of one in the configuration."""
-    if options.mqtt is None:
-        _refuse("mqtt", OF_MQTT, options, "is for a broker: add --mqtt mqtts://broker/prefix")
-        return controllers
-    return _with(controllers, PublisherConfig("mqtt", mqtt_options(options, options.mqtt)))
-
-
-def _refuse(of: str, names: tuple[str, ...], options: Namespace, why: str) -> None:
-    """An option of a publisher that is not asked for."""
-    for name in names:
-        if getattr(options, f"{of}_{name}"):
-            raise UsageError(f"--{of}-{name.replace('_', '-')} {why}")
-
-
 def _with(controllers: tuple[ControllerConfig, ...], asked: PublisherConfig) -> tuple[ControllerConfig, ...]:
-    """The controllers with a publisher, instead of one of its type."""
-    from ..gateway.plant import DEFAULT_CONTROLLER, DEFAULT_PUBLISHERS
+    """The controllers with a publisher that replaces those of its type."""
+    from ..gateway.controller_config import DEFAULT_CONTROLLER, DEFAULT_PUBLISHERS
 
     return tuple(
         dataclasses.replace(

@@ -1,4 +1,4 @@
-"""Recorded logs as a picture, or added up as JSON."""
+"""Draw recorded logs as HTML, or sum them up as JSON."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from .. import __version__
 from ..errors import NothingHeardError
+from ..version import __version__
 from . import PROGRAM
 from .options import system, verbosity
 from .overrides import loaded, only
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Which logs, and where the picture goes."""
+    """The logs and the output file."""
     parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log (.tlog)")
     parser.add_argument("-o", "--output", metavar="FILE.html", help="where to write (the log's name with .html, here)")
     parser.add_argument("--as-json", action="store_true", help="totals and intervals as JSON instead, or besides -o")
@@ -32,8 +32,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """The name of the file that was written, or JSON, on standard output."""
-    from ..views.report import as_html, as_json, save
+    """Print the name of the written file, or JSON."""
+    from ..views.html_report import as_html, as_json, save
 
     config = loaded(options)
     if options.system is not None:
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _timeline(config: Config, path: str) -> Timeline:
-    from ..gateway.report import watch
+    from ..diagnosis.log_report import watch
     from ..views.progress import ProgressLine
     from ..views.timeline import TimelineBuilder
 

@@ -1,14 +1,17 @@
-"""The main job: links in, statuses out; or a recorded log instead of the links."""
+"""Run the gateway on live links, or replay a recorded log."""
 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from ..errors import UsageError
-from ..link.url import parse
+from ..links.url import parse
+from ..publishers.json_lines import JsonOptions
+from ..publishers.mqtt.options import MqttOptions
+from ..publishers.web.options import HttpOptions
 from . import PROGRAM
-from .options import baud, broker, connections, rate, system, verbosity, web
+from .options import baud, connections, publisher, rate, system, verbosity
 from .overrides import configured
 
 if TYPE_CHECKING:
@@ -16,34 +19,27 @@ if TYPE_CHECKING:
 
     from ..config import Config
 
-FORMATS: Final = ("native", "ros1", "ros2")
-
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """All that a gateway can be told."""
+    """All arguments of a gateway."""
     connections(parser)
     parser.add_argument("--config", metavar="FILE", help="configuration (YAML); options override it")
-    parser.add_argument("--out", action="append", metavar="CONNECTION", help="where MAVLink goes besides; repeatable")
+    parser.add_argument("--out", action="append", metavar="CONNECTION", help="also send MAVLink there; repeatable")
     parser.add_argument("--rate", type=rate, metavar="HZ", help="publish_rate of the controllers (10)")
-    parser.add_argument("--changes-only", action="store_true", help="JSON lines only when something changes")
-    parser.add_argument("--json", metavar="FILE|-|none", help="where the JSON lines go (-: standard output)")
-    parser.add_argument("--format", choices=FORMATS, help="form of the JSON lines (native)")
+    publisher(parser, JsonOptions)
     parser.add_argument("--system", type=system, metavar="N", help="only the vehicle with this system id")
     parser.add_argument("--baud", type=baud, metavar="N", help="baud rate of serial connections (57600)")
-    parser.add_argument("--signing-key", metavar="FILE", help="sign what is sent, believe only what is signed")
-    parser.add_argument("--record", metavar="FILE", help="record everything received and sent")
-    web(parser)
-    parser.add_argument("--mqtt", metavar="URL", help="statuses and events to a broker, e.g. mqtts://broker/robots")
-    parser.add_argument("--mqtt-robot", metavar="NAME", help="what a robot is called there ({host}-{system})")
-    parser.add_argument("--mqtt-spool", metavar="FILE", help="where events wait that cannot be delivered")
-    broker(parser)
-    parser.add_argument("--forward", action="store_true", help="pass every frame on between the links and the outs")
-    parser.add_argument("--passive", action="store_true", help="never send anything on the vehicle links")
+    parser.add_argument("--signing-key", metavar="FILE", help="sign sent frames, accept only signed frames")
+    parser.add_argument("--record", metavar="FILE", help="record all frames received and sent")
+    publisher(parser, HttpOptions)
+    publisher(parser, MqttOptions)
+    parser.add_argument("--forward", action="store_true", help="forward every frame between the links and the outs")
+    parser.add_argument("--passive", action="store_true", help="never send on the vehicle links")
     verbosity(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Until it is ended, or the log is."""
+    """Run until a signal, or until the end of the log."""
     config = configured(options)
     log = _log(config)
     if log is None:
@@ -56,16 +52,16 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _log(config: Config) -> str | None:
-    """The first recorded log among the connections. Raises UsageError for what is no connection."""
+    """The first recorded log among the connections. Raises UsageError for an invalid connection."""
     urls = [parse(link.url) for link in config.links]
-    return next((url.device for url in urls if url.kind == "log"), None)
+    return next((url.device for url in urls if url.kind.is_log), None)
 
 
 def _live(config: Config, options: argparse.Namespace) -> int:
-    from ..gateway.live import Live
-    from ..gateway.notify import Notifier
+    from ..gateway.event_loop import EventLoop
+    from ..gateway.systemd import SystemdNotifier
 
-    gateway = Live(config, sys.stdout, notifier=Notifier())
+    gateway = EventLoop(config, sys.stdout, notifier=SystemdNotifier())
     gateway.stop_on_signals()
     if options.config:
         gateway.reload_on_hangup(lambda: _again(options))
@@ -74,10 +70,10 @@ def _live(config: Config, options: argparse.Namespace) -> int:
 
 
 def _again(options: argparse.Namespace) -> Config:
-    """The configuration, read again while the gateway runs."""
+    """Read the configuration again while the gateway runs."""
     config = configured(options)
     if log := _log(config):
-        raise UsageError(f"{log}: a recorded log is replayed alone, by a command of its own")
+        raise UsageError(f"{log}: a recorded log is replayed alone, with a separate command")
     return config
 
 
@@ -85,7 +81,7 @@ def _check_replay(config: Config, options: argparse.Namespace, log: str) -> None
     if options.http is not None:
         raise UsageError(f"{log}: a recorded log has no live page; write `{PROGRAM} report {log}`")
     if options.mqtt is not None:
-        raise UsageError(f"{log}: a recorded log is no robot's status now: replay it without --mqtt")
+        raise UsageError(f"{log}: a recorded log is not a live status: replay it without --mqtt")
     if len(config.links) > 1 or config.outs:
         raise UsageError(f"{log}: a recorded log is replayed alone, without other connections or --out")
     if config.record is not None or config.forward:

@@ -1,11 +1,11 @@
-"""A live table of the vehicles, until the person ends it."""
+"""Show a live table of the vehicles, until the user quits."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
-from ..link.url import parse
+from ..links.url import parse
 from . import PROGRAM
 from .options import connections, looking
 from .overrides import configured
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Which vehicles."""
+    """The connections and the vehicles."""
     connections(parser)
     looking(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """The terminal is as before when it ends."""
-    from ..gateway.watched import Watched
+    """Restore the terminal at the end."""
+    from ..gateway.background import BackgroundGateway
     from ..views.terminal import show
 
     config = configured(options)
     for url in (parse(link.url) for link in config.links):
-        if url.kind == "log":
+        if url.kind.is_log:
             raise UsageError(f"{url.text} is a recorded log; see it as a picture: {PROGRAM} report {url.text}")
-    with Watched(config) as source:
+    with BackgroundGateway(config) as source:
         show(source)
     return 0

@@ -1,17 +1,27 @@
-"""The configuration: plain values (`Config` and its parts), read from YAML by `load`, put in words by `describe`.
+"""The configuration: plain values (`Config` and its parts). `load` reads YAML, `describe` explains a configuration.
 
-YAML is imported when a file is read and not before: most runs have none.
+YAML is imported only when a file is read.
 """
 
 from __future__ import annotations
 
 import os
 
-from .model import Config, ControllerConfig, IdentityConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
+from .model import (
+    Config,
+    ControllerConfig,
+    HardwareConfig,
+    IdentityConfig,
+    LinkConfig,
+    PublisherConfig,
+    SigningConfig,
+    VehicleConfig,
+)
 
 __all__ = [
     "Config",
     "ControllerConfig",
+    "HardwareConfig",
     "IdentityConfig",
     "LinkConfig",
     "PublisherConfig",
@@ -33,7 +43,7 @@ def load(path: str | os.PathLike[str]) -> Config:
 
 
 def describe(config: Config) -> list[str]:
-    """What a configuration means, in words, a line for each part."""
-    from .words import describe
+    """What a configuration means, one line per part."""
+    from .describe import describe
 
     return describe(config)

@@ -1,7 +1,7 @@
-"""A YAML file as a tree of values that know their place in it. The only module that knows YAML.
+"""A YAML file as a tree of values with their places in it. The only module that imports YAML.
 
-Bounded whatever the file holds: its size, depth and number of values are limited, and aliases, which can make a short
-file mean gigabytes, are refused.
+Bounded for any file: size, depth and number of values are limited. Aliases are refused, because they can expand a
+short file to gigabytes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MAX_DEPTH: Final = 20
 MAX_VALUES: Final = 20_000
 """Keys and values of a file: PyYAML needs about a kilobyte and 20 us for each."""
 MAX_NUMBER: Final = 64
-"""Characters of a number: the time to read one grows with the square of its length."""
+"""Characters of a number. The time to read one grows with the square of its length."""
 
 _TAG: Final = "tag:yaml.org,2002:"
 _CONSTRUCTED: Final = {_TAG + name for name in ("null", "bool", "int", "float")}
@@ -42,7 +42,7 @@ class Node(NamedTuple):
     text: str
     """A scalar as it was written, without quotes; empty for lists and mappings."""
     name: str
-    """What to call it in a message: its key, or `links[0]`."""
+    """Its name in messages: its key, or `links[0]`."""
     at: str
     """`file:line:column`, both from 1."""
     key: Node | None = None
@@ -57,13 +57,13 @@ class Node(NamedTuple):
         return (self.key or self).fault(text)
 
     def plain(self) -> object:
-        """The value without places. The keys of its mappings are texts, as in JSON."""
+        """The value without places. Keys of mappings are strings, as in JSON."""
         if isinstance(self.value, dict):
             return {key: node.plain() for key, node in self.value.items()}
         return [node.plain() for node in self.value] if isinstance(self.value, list) else self.value
 
     def shown(self) -> str:
-        """The value in a message, at most about 40 characters of it."""
+        """The value for a message, cut to about 40 characters."""
         if isinstance(self.value, dict | list):
             return "a mapping" if isinstance(self.value, dict) else "a list"
         if isinstance(self.value, str):
@@ -78,7 +78,7 @@ def short(text: str, limit: int = 40) -> str:
 
 
 def quoted(text: str) -> str:
-    """A person's text in a message: short and in quotes."""
+    """A user's text for a message: short and in quotes."""
     return f"'{short(text)}'"
 
 
@@ -101,7 +101,7 @@ def load_document(path: str | os.PathLike[str]) -> Node:
 
 
 def parse_document(text: str, name: str) -> Node:
-    """The same for a text; `name` stands for the file in messages. Raises ConfigError."""
+    """The document in a text. `name` is the file name for messages. Raises ConfigError."""
     try:
         loader = _Loader(text)
     except yaml.reader.ReaderError as error:
@@ -115,14 +115,14 @@ def parse_document(text: str, name: str) -> Node:
     except yaml.MarkedYAMLError as error:
         raise ConfigError(_explained(error, name)) from None
     except (ValueError, OverflowError):
-        # PyYAML lets the escape of a character that does not exist fall through.
+        # PyYAML does not catch the escape of an invalid character
         raise ConfigError(f"{_mark(name, loader.get_mark())}: not YAML: no such character or number") from None
     finally:
         loader.dispose()
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's reader up to nodes, within limits and without aliases."""
+    """PyYAML's loader with limits, without aliases."""
 
     depth = 0
     values = 0
@@ -146,14 +146,14 @@ class _Loader(yaml.SafeLoader):
 
 
 class _Builder:
-    """From PyYAML's nodes to ours."""
+    """Converts PyYAML's nodes to ours."""
 
     def __init__(self, loader: _Loader, file: str) -> None:
         self._loader = loader
         self._file = file
 
     def node(self, node: yaml.Node, name: str, key: Node | None = None) -> Node:
-        """One node with all below it."""
+        """Convert one node and its children."""
         at = _mark(self._file, node.start_mark)
         if node.tag not in _KNOWN_TAGS:
             raise ConfigError(f"{at}: the tag {quoted(node.tag.replace(_TAG, '!!'))} means nothing here: remove it")
@@ -197,14 +197,14 @@ def _mark(file: str, mark: yaml.Mark | None) -> str:
 
 
 def _place(file: str, before: str) -> str:
-    """The place behind a piece of text."""
+    """The place at the end of a text."""
     lines = before.split("\n")
     return f"{file}:{len(lines)}:{len(lines[-1]) + 1}"
 
 
 def _explained(error: yaml.MarkedYAMLError, file: str) -> str:
-    """PyYAML's several lines as one, with what would be right where that is known."""
-    # PyYAML quotes what it found, however long that is.
+    """PyYAML's error as one line, with a hint for known errors."""
+    # PyYAML quotes texts of any length
     said = ", ".join(short(part, 120) for part in (error.context, error.problem) if part)
     hint = next((hint for sign, hint in _HINTS.items() if sign in said), None)
     return f"{_mark(file, error.problem_mark or error.context_mark)}: {said}" + (f": {hint}" if hint else "")

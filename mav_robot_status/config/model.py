@@ -1,4 +1,4 @@
-"""What a configuration holds. The annotations are the schema from which the file is read and checked."""
+"""The values of a configuration. The annotations are the schema of the file."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple
 
-from ..hardware.options import HardwareOptions, Within
+from ..hardware.mavlink.options import HardwareOptions, Within
 from ..interface import DEFAULT_HANDLE_NAME
 
 
 class Or(NamedTuple):
-    """The word that stands for None."""
+    """The word for None in a file."""
 
     word: str
 
@@ -24,16 +24,16 @@ class LinkConfig:
     """A link to a vehicle, or an output."""
 
     url: str
-    """As `link.url.parse` takes it; it was checked."""
+    """A checked connection string, see `links.url.parse`."""
     passive: bool = False
     """Nothing is ever sent there."""
     robot_status: Annotated[bool | None, Or("auto")] = None
-    """Whether ROBOT_STATUS is sent to the vehicles there; None: yes, but not on serial lines, which are narrow."""
+    """Whether ROBOT_STATUS is sent to the vehicles there. None: yes, except on serial links, which are slow."""
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleConfig:
-    """A vehicle to expect, and the handle that its status goes to."""
+    """An expected vehicle and its handle."""
 
     system: Annotated[int | None, Id, Or("auto")] = None
     """None: the first autopilot heard that no other entry names."""
@@ -44,31 +44,43 @@ class VehicleConfig:
 
 @dataclass(frozen=True, slots=True)
 class IdentityConfig:
-    """Who we are on MAVLink."""
+    """Our ids on MAVLink."""
 
     system: Annotated[int | None, Id, Or("auto")] = None
-    """None: the system of the vehicle that we speak about."""
+    """None: the system id of the vehicle that a message is about."""
     component: Annotated[int, Id] = 192
     heartbeat: bool = True
-    """Send a HEARTBEAT of our own."""
+    """Send our own HEARTBEAT."""
 
 
 @dataclass(frozen=True, slots=True)
 class SigningConfig:
-    """MAVLink 2 signing: what we send is signed, and what comes in is believed only with a signature."""
+    """MAVLink 2 signing: we sign what we send, and accept only signed frames."""
 
     key_file: str
-    """As `gateway.keys.read_key` takes it; it was not opened."""
+    """The path for `gateway.signing_keys.read_key`; not opened yet."""
     accept_unsigned: Literal["none", "radio_status", "all"] = "radio_status"
-    """What is taken without a signature: telemetry radios have no key to sign their RADIO_STATUS with."""
+    """Frames that are accepted without a signature: telemetry radios have no key to sign their RADIO_STATUS."""
     link_id: Annotated[int, Within(0, 255)] = 192
-    """Of our first link; each further link and out has the next. Only senders with our system and component ids must
-    use others."""
+    """The link id of our first link. Each further link and out has the next one. Only senders with our system and
+    component ids must use others."""
+
+
+@dataclass(frozen=True, slots=True)
+class HardwareConfig:
+    """A hardware interface other than MAVLink. `type` is its registered name."""
+
+    type: str
+    name: str
+    options: Mapping[str, object] = field(default_factory=dict)
+    """Everything except type and name, as plain values."""
+    where: str = field(default="", compare=False)
+    """`file:line:column`."""
 
 
 @dataclass(frozen=True, slots=True)
 class PublisherConfig:
-    """An output of a controller, by the name under which it is registered."""
+    """A publisher of a controller. `type` is its registered name."""
 
     type: str
     options: Mapping[str, object] = field(default_factory=dict)
@@ -83,7 +95,7 @@ class ControllerConfig:
     name: str
     type: str
     parameters: Mapping[str, object]
-    """Everything beside the type, as plain values; only what is written, without defaults."""
+    """Everything except the type, as plain values, without defaults."""
     where: str
     """`file:line:column` of the stanza."""
     publishers: tuple[PublisherConfig, ...] | None = None
@@ -92,24 +104,32 @@ class ControllerConfig:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """A whole configuration; as created, the defaults."""
+    """A whole configuration. As created it has the defaults."""
 
     links: tuple[LinkConfig, ...] = ()
     outs: tuple[LinkConfig, ...] = ()
-    """Where MAVLink goes besides the vehicles' links."""
+    """Receivers of MAVLink other than the vehicle links."""
     vehicles: tuple[VehicleConfig, ...] = ()
     """Empty: every autopilot heard becomes a handle."""
     identity: IdentityConfig = IdentityConfig()
     hardware: HardwareOptions = field(default_factory=HardwareOptions)
+    """The options of the MAVLink hardware interface."""
+    interfaces: tuple[HardwareConfig, ...] = ()
+    """The other hardware interfaces."""
     requests: Literal["missing", "none"] = "missing"
-    """Whether a message that is needed and does not come is asked for."""
+    """Whether a needed message that does not arrive is requested."""
     signing: Annotated[SigningConfig | None, Or("none")] = None
     """None: nothing is signed or verified."""
     coalesce: Annotated[float, Within(0.0, 1.0, "s")] = 0.0
-    """Seconds to let input gather before it is read: fewer wake-ups for as much delay."""
+    """Seconds to wait for more input before reading: fewer wake-ups, more delay."""
     forward: bool = False
-    """Pass every frame on between the links and the outs, by MAVLink's routing rules."""
+    """Forward every frame between the links and the outs, by MAVLink's routing rules."""
     record: Annotated[str | None, Or("none")] = None
-    """The .tlog file that takes everything received and sent."""
+    """The .tlog file for all frames received and sent."""
     controllers: tuple[ControllerConfig, ...] = ()
     """Empty: the default controller."""
+
+    @property
+    def hears_mavlink(self) -> bool:
+        """Whether MAVLink vehicles can appear: there are links, or no other hardware interface."""
+        return bool(self.links) or not self.interfaces

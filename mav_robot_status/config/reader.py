@@ -1,4 +1,4 @@
-"""The sections of a configuration file, and what has to hold between them."""
+"""Reads the sections of a configuration file, and checks conditions across sections."""
 
 from __future__ import annotations
 
@@ -6,24 +6,26 @@ import os
 from collections.abc import Mapping
 from typing import Any, Final, get_type_hints
 
-from ..hardware.options import BELOW
+from ..hardware.mavlink.options import BELOW
 from ..interface import DEFAULT_HANDLE_NAME
-from ..link import url
+from ..links import url
 from .document import Node, load_document, quoted
-from .model import Config, ControllerConfig, PublisherConfig, VehicleConfig
+from .model import Config, ControllerConfig, HardwareConfig, PublisherConfig, VehicleConfig
 from .values import did_you_mean, entries, read
 
 OUR_TYPES: Final = (
     "mav_robot_status/IndustrialRobotStatusController",
     "industrial_robot_status_controller/IndustrialRobotStatusController",
 )
+MAVLINK: Final = "mavlink"
+"""The type of the MAVLink hardware interface in a list."""
 PARAMETERS: Final[dict[str, Any]] = {
     "handle_name": str,
     "publish_rate": float,
     "publish_on_change": bool,
     "publishers": tuple[PublisherConfig, ...],
 }
-"""What our own controller takes. What another type takes is for that type to check, but for its outputs."""
+"""The parameters of our controller. Another type checks its own, except for `publishers`."""
 SHARED: Final = frozenset({"publishers"})
 
 
@@ -38,16 +40,47 @@ def load(path: str | os.PathLike[str]) -> Config:
 def build(document: Node) -> Config:
     """The configuration that a file holds. Raises ConfigError."""
     sections = get_type_hints(Config, include_extras=True)
-    del sections["controllers"]
-    given = entries(document)
+    del sections["controllers"], sections["interfaces"]
+    given, interfaces = _hardware(entries(document))
     read_sections = {key: read(sections[key], node) for key, node in given.items() if key in sections}
     stanzas = [_controller(key, node, sections) for key, node in given.items() if key not in sections]
-    config = Config(**read_sections, controllers=tuple(stanzas))
+    config = Config(**read_sections, interfaces=interfaces, controllers=tuple(stanzas))
     _check_hysteresis(config, given)
     _check_outs(config, given)
     _check_vehicles(config.vehicles, given)
     _check_handles(config, given)
     return config
+
+
+def _hardware(given: dict[str, Node]) -> tuple[dict[str, Node], tuple[HardwareConfig, ...]]:
+    """Split the list `hardware`: the entries with MAVLink's options as a mapping, and the other interfaces."""
+    section = given.get("hardware")
+    if section is None or not isinstance(section.value, list):
+        return given, ()
+    given = {key: node for key, node in given.items() if key != "hardware"}
+    others: dict[str, HardwareConfig] = {}
+    for node in section.value:
+        kind, name, options = _typed(node)
+        if kind == MAVLINK:
+            if "hardware" in given:
+                raise node.fault("two MAVLink hardware interfaces: keep one, and write all its links below 'links'")
+            given["hardware"] = node._replace(value=options)
+        elif name in others:
+            raise node.fault(f"two hardware interfaces are named {quoted(name)}: give each its own 'name'")
+        else:
+            plain = {key: option.plain() for key, option in options.items()}
+            others[name] = HardwareConfig(kind, name, plain, node.at)
+    return given, tuple(others.values())
+
+
+def _typed(node: Node) -> tuple[str, str, dict[str, Node]]:
+    """The type, the name and the options of one hardware interface. The default name is the type."""
+    options = dict(entries(node))
+    if "type" not in options:
+        raise node.fault(f"{node.name} has no 'type': write {{type: mavlink}}, or {{type: ..., name: ...}}")
+    kind = read(str, options.pop("type"))
+    name = read(str, options.pop("name")) if "name" in options else kind
+    return kind, name, options
 
 
 def _controller(name: str, node: Node, sections: Mapping[str, Any]) -> ControllerConfig:
@@ -74,12 +107,12 @@ def _check_hysteresis(config: Config, given: dict[str, Node]) -> None:
 
 def _check_outs(config: Config, given: dict[str, Node]) -> None:
     for out, node in zip(config.outs, _items(given, "outs"), strict=True):
-        if url.parse(out.url).kind == "log":
+        if url.parse(out.url).kind.is_log:
             raise node.fault(
-                f"{quoted(out.url)} is a log, and an out is sent to: write one like udpout:192.168.1.20:14550"
+                f"{quoted(out.url)} is a log, and an out needs a receiver: write one like udpout:192.168.1.20:14550"
             )
         if out.passive:
-            raise entries(node)["passive"].key_fault("an out is there to be sent to: remove 'passive'")
+            raise entries(node)["passive"].key_fault("an out cannot be passive: remove 'passive'")
 
 
 def _check_vehicles(vehicles: tuple[VehicleConfig, ...], given: dict[str, Node]) -> None:
@@ -96,6 +129,8 @@ def _check_vehicles(vehicles: tuple[VehicleConfig, ...], given: dict[str, Node])
 
 
 def _check_handles(config: Config, given: dict[str, Node]) -> None:
+    if config.interfaces:  # they register their handles when they open
+        return
     handles = {vehicle.handle: None for vehicle in config.vehicles}
     for controller in config.controllers:
         wanted = controller.parameters.get("handle_name", DEFAULT_HANDLE_NAME)

@@ -1,7 +1,7 @@
-"""From a place in the file to a checked Python value, led by a type: `read(int, node)`, `read(LinkConfig, node)`.
+"""Converts a node of the file to a checked value of a type: `read(int, node)`, `read(LinkConfig, node)`.
 
-The types are those of the fields in `model` and `hardware.options`, so a new option needs nothing here; a new kind of
-value is one small function and one line in a table.
+The types are those of the fields in `model` and `hardware.options`, so a new option needs no change here. A new kind
+of value is one small function and one line in a table.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from enum import EnumMeta
 from typing import Annotated, Any, Final, Literal, get_args, get_origin, get_type_hints
 
 from ..errors import ConfigError, UsageError
-from ..hardware.options import OneOf, Within
-from ..link import url
+from ..hardware.mavlink.options import OneOf, Within
+from ..links import url
 from .document import Node, quoted, short
 from .model import LinkConfig, Or, PublisherConfig
 
@@ -26,7 +26,7 @@ _SECONDS: Final = re.compile(r"(\d+(?:\.\d*)?|\.\d+) ?(ms|s)", re.ASCII)
 
 
 def read(hint: Any, node: Node) -> Any:
-    """The node as a value of that type. Raises ConfigError with the place, what is wrong and what would be right."""
+    """The node as a value of that type. Raises ConfigError with the place, the fault and the remedy."""
     if hint in _KINDS:
         return _KINDS[hint](node)
     if dataclasses.is_dataclass(hint):
@@ -37,7 +37,7 @@ def read(hint: Any, node: Node) -> Any:
 
 
 def read_fields(cls: Any, node: Node) -> Any:
-    """A mapping as a dataclass; what is not written has the field's default, if it has one."""
+    """A mapping as a dataclass. A missing key gets the default of its field."""
     hints = get_type_hints(cls, include_extras=True)
     given = entries(node, hints)
     for field in dataclasses.fields(cls):
@@ -47,7 +47,7 @@ def read_fields(cls: Any, node: Node) -> Any:
 
 
 def entries(node: Node, known: Iterable[str] | None = None) -> dict[str, Node]:
-    """The entries of a mapping, none for an empty value. Refuses keys beside the known ones."""
+    """The entries of a mapping; none for an empty value. Refuses unknown keys."""
     if node.value is None:
         return {}
     if not isinstance(node.value, dict):
@@ -111,7 +111,7 @@ def _annotated(hint: Any, node: Node) -> Any:
     base, *rules = get_args(hint)
     by_type = {type(rule): rule for rule in rules}
     if (word := by_type.get(Or)) is not None:
-        # `base` is `kind | None`: the word is how a file writes None.
+        # `base` is `kind | None`; the file writes the word for None
         if node.text == word.word:
             return None
         base = next(kind for kind in get_args(base) if kind is not type(None))
@@ -125,7 +125,7 @@ def _annotated(hint: Any, node: Node) -> Any:
 
 
 def _literal(hint: Any, node: Node) -> str:
-    # What was written counts: `false` is one of the words, though YAML takes it for something else.
+    # compare the text: YAML reads `false` as a bool
     return _one_of(node.text, get_args(hint), node)
 
 

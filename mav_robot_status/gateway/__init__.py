@@ -1,1 +1,1 @@
-"""Builds the parts and turns the loop: `plant` is the part without I/O, `live` and `replay` feed it."""
+"""The running program: `event_loop` and `replay` drive a `pipeline`, one on live hardware, one on a recorded log."""

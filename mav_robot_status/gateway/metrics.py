@@ -1,4 +1,4 @@
-"""What a live gateway counts, as values for `/metrics`: taken in its own thread, and cheap, for no text is made."""
+"""Collects the counters of a live gateway for `/metrics`, in the gateway's thread. It formats no text."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..interface import IndustrialRobotStatusHandle
-    from .plant import Plant
-    from .station import Station
-    from .switchboard import Switchboard
+    from .endpoint import Endpoint
+    from .link_hub import LinkHub
+    from .pipeline import Pipeline
 
 
-def metrics(plant: Plant, switchboard: Switchboard, now: Instant) -> Metrics:
-    """Everything up to `now`."""
-    handles = plant.hw.handles
+def metrics(pipeline: Pipeline, hub: LinkHub, now: Instant) -> Metrics:
+    """All values and counters at `now`."""
+    handles = pipeline.hw.handles
     return Metrics(
         tuple(_vehicle(handles.get_handle(name), now) for name in handles.get_names()),
-        tuple(_connection(station) for station in switchboard.stations),
-        tuple(_publishers(plant)),
-        switchboard.record_dropped,
+        tuple(_connection(endpoint) for endpoint in hub.endpoints),
+        tuple(_publishers(pipeline)),
+        hub.record_dropped,
     )
 
 
@@ -33,26 +33,26 @@ def _vehicle(handle: IndustrialRobotStatusHandle, now: Instant) -> RobotStatusMs
     return RobotStatusMsg(handle.name, now.unix_us, handle.status, handle.detail, age)
 
 
-def _connection(station: Station) -> ConnectionMetrics:
-    got = station.totals()
+def _connection(endpoint: Endpoint) -> ConnectionMetrics:
+    got = endpoint.totals()
     return ConnectionMetrics(
-        station.url,
-        station.is_out,
-        sum(1 for _ in station.peers()),
+        endpoint.url,
+        endpoint.is_out,
+        sum(1 for _ in endpoint.peers()),
         got.frames,
         got.lost,
         got.bad_crc,
         sum(got.unknown.values()),
         got.incompatible,
         got.garbage_bytes,
-        station.link.dropped,
+        endpoint.link.dropped,
     )
 
 
-def _publishers(plant: Plant) -> Iterator[PublisherMetrics]:
-    """A publisher that holds something says so in `queued`, one that drops something in `dropped`."""
+def _publishers(pipeline: Pipeline) -> Iterator[PublisherMetrics]:
+    """Publishers count messages in `queued` and `dropped`."""
     numbers: Counter[str] = Counter()
-    for (kind, _), publisher in plant.publishers.items():
+    for (kind, _), publisher in pipeline.publishers.items():
         numbers[kind] += 1
-        dropped = getattr(publisher, "dropped", 0) + plant.skipped(publisher)
+        dropped = getattr(publisher, "dropped", 0) + pipeline.skipped(publisher)
         yield PublisherMetrics(kind, numbers[kind], getattr(publisher, "queued", 0), dropped)

@@ -1,4 +1,4 @@
-"""A recorded log through the plant, as fast as it can be read, on the log's own time."""
+"""Replays a recorded log through the pipeline, at full speed, on the log's time."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import later
-from .plant import NEVER, Plant
-from .recorded import Recording
+from .live_hardware import combined, open_interface
+from .mavlink_hardware import robot_hw
+from .pipeline import NEVER, Pipeline
+from .recorded_log import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterable, Sequence
@@ -17,23 +19,24 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..config import Config
     from ..interface import Audience
-    from ..link.log import Stamped
+    from ..links.log import Stamped
+    from .observer import Observer
 
 log = logging.getLogger(__name__)
 
 MOST_OVERDUE: Final = 3
-"""Rounds without progress in which a part of a third party may ask to be called again at once."""
+"""Consecutive ticks that a third party's part may request without progress of the time."""
 
 
-class Nobody:
-    """The MAVLink port of a replay: there is nobody to send to."""
+class NoMavlinkPort:
+    """The MAVLink port of a replay: it has no receivers."""
 
     def audiences(self) -> Sequence[Audience]:
-        """Nobody."""
+        """No receivers."""
         return ()
 
     def requests(self) -> Collection[tuple[Hashable, int]]:
-        """Nobody asks."""
+        """No requests."""
         return ()
 
     def send(self, message: Any, system: int, audience: Audience) -> None:
@@ -41,50 +44,68 @@ class Nobody:
 
 
 def replay(config: Config, path: str, stdout: TextIO) -> None:
-    """Replay the log at `path`. Raises UsageError if it cannot be read, BrokenPipeError if nobody reads the lines."""
+    """Replay the log at `path`. Raises UsageError if it cannot be read, BrokenPipeError if stdout is closed."""
     recording = Recording(path)
     log.info("replaying %s", path)
-    plant = Plant(config, Nobody(), stdout, patient=True)
+    pipeline = ReplayPipeline(config, stdout)
     try:
-        plant.now = run_through(plant, recording)
+        pipeline.now = run_through(pipeline, recording)
     finally:
-        plant.close(plant.now)
+        pipeline.close(pipeline.now)
     log.info("%s", recording.summary())
 
 
-def run_through(plant: Plant, recording: Iterable[Stamped]) -> Instant:
-    """Feed a recording to the plant; gives the last instant of it. The plant has lived what came before the next."""
-    hw = plant.hw
+class ReplayPipeline(Pipeline):
+    """A pipeline for a recorded log."""
+
+    def __init__(self, config: Config, stdout: TextIO, observers: Sequence[Observer] = ()) -> None:
+        """Make the parts. Hardware interfaces other than MAVLink register their handles and open nothing."""
+        self.vehicles = robot_hw(config)
+        others = [open_interface(interface, replay=True, clock=lambda: self.now) for interface in config.interfaces]
+        hw = combined(self.vehicles, others)
+        super().__init__(config, hw, NoMavlinkPort(), stdout, patient=True, observers=observers)
+
+    def close(self, now: Instant) -> None:
+        """Stop the controllers; close the publishers and the hardware."""
+        try:
+            super().close(now)
+        finally:
+            self.hw.close()
+
+
+def run_through(pipeline: ReplayPipeline, recording: Iterable[Stamped]) -> Instant:
+    """Feed a recording to the pipeline. Returns the last instant; everything due before it is done."""
+    hw = pipeline.vehicles
     take = hw.take
     last = NEVER
-    due = -math.inf  # the first record is where it begins
+    due = -math.inf  # time starts at the first record
     for now, frame, new_segment in recording:
         mono = now.mono
         if new_segment:
-            plant.forget(last)
+            pipeline.forget(last)
         elif due < mono or hw.deadline < mono:
             if last is NEVER:
-                plant.tick(now)  # vehicles that are expected have lines before they are heard
+                pipeline.tick(now)  # publish configured vehicles before their first heartbeat
                 last = now
-            due = plant.next_due(last.mono, mono)
+            due = pipeline.next_due(last.mono, mono)
             if due < mono:
-                live_through(plant, last, now)
-                due = plant.next_due(mono)
+                run_until(pipeline, last, now)
+                due = pipeline.next_due(mono)
         if frame is not None:
             take(frame, now)
-            if hw.stirred:
-                plant.tick(now)
-                due = plant.next_due(mono)
+            if hw.dirty_vehicles:
+                pipeline.tick(now)
+                due = pipeline.next_due(mono)
         last = now
     return last
 
 
-def live_through(plant: Plant, last: Instant, until: Instant) -> None:
-    """Do what falls due between two records at the time when it falls due, as a live gateway would."""
+def run_until(pipeline: Pipeline, last: Instant, until: Instant) -> None:
+    """Tick at every due time between two records, as a live gateway does."""
     moment = last
     overdue = 0
-    while (due := plant.next_due(moment.mono)) < until.mono and overdue <= MOST_OVERDUE:
+    while (due := pipeline.next_due(moment.mono)) < until.mono and overdue <= MOST_OVERDUE:
         overdue = overdue + 1 if due <= moment.mono else 0
         if due > moment.mono:
             moment = later(last, due - last.mono)._replace(mono=due)
-        plant.tick(moment)
+        pipeline.tick(moment)

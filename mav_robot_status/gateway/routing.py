@@ -1,19 +1,20 @@
-"""Which frames go on to which channels. No input or output of its own: channels are opaque, time is an argument.
+"""Decides to which channels a frame is forwarded. No I/O: channels are opaque, time is an argument.
 
-The rules are those of https://mavlink.io/en/guide/routing.html. Where it leaves a choice:
+The rules are those of https://mavlink.io/en/guide/routing.html. Where they leave a choice:
 
-* A frame for a component that was heard goes where exactly that component was heard (mavlink-router). If it never was,
-  but its system was, the frame goes where the system was heard: so does ArduPilot for systems other than its own
-  (MAVLink_routing.cpp, 2c), while mavlink-router drops it. Thus a component behind the autopilot that only listens is
-  reached as on a direct cable.
-* Nothing goes to a channel where its very sender was heard: who is there has it already (mavlink-router, accept_msg).
-* Between two vehicle links a broadcast passes only if both lead to parts of the same system (MAVROS's router keeps
-  vehicles apart, too). An autopilot may take another vehicle's DISTANCE_SENSOR or GPS_INPUT for its own, and two
-  telemetry streams do not fit one radio. Everything else passes: vehicle to outs, out to vehicles and to other outs.
-* A frame that comes again on another channel is a copy. It is dropped, and is no evidence of who is where: a line that
-  echoes would else seem to be where everybody is. Repeats on the channel of the first are passed on (senders whose
-  sequence stands still repeat themselves), until a copy has shown that this frame goes round.
-* Frames of ids that we do not know are broadcasts, and as nobody could check them nobody is learned from them.
+* A frame for a known component goes to the channels on which that component was heard (mavlink-router). If only its
+  system is known, the frame goes to the channels of the system. ArduPilot does the same for systems other than its own
+  (MAVLink_routing.cpp, 2c); mavlink-router drops the frame. This reaches a component behind the autopilot that only
+  listens, as on a direct cable.
+* A frame does not go to a channel on which its sender was heard: receivers there already have it (mavlink-router,
+  accept_msg).
+* Between two vehicle links a broadcast is forwarded only if both lead to the same system (MAVROS's router also keeps
+  vehicles apart). An autopilot could use another vehicle's DISTANCE_SENSOR or GPS_INPUT as its own, and two telemetry
+  streams do not fit one radio. All other directions are forwarded: vehicle to outs, out to vehicles and other outs.
+* A frame that arrives again on another channel is a copy. It is dropped, and the router learns nothing from it:
+  otherwise every sender would seem to be on a line that echoes. Repeats on the first channel are forwarded (a sender
+  with a constant sequence number repeats itself), until a copy shows that this frame loops.
+* Frames with unknown ids are broadcasts. Their CRC cannot be checked, so the router learns nothing from them.
 """
 
 from __future__ import annotations
@@ -31,62 +32,62 @@ if TYPE_CHECKING:
     from ..mavlink.framing import Frame
 
 SILENCE: Final = 300.0
-"""Seconds after which it is forgotten who was heard where."""
+"""Seconds after which a silent route is forgotten."""
 WINDOW: Final = 1.0
-"""Seconds for which a frame is known again, at least; twice that at most. A decision is kept no longer, either."""
+"""Copies are recognised for at least this many seconds, and at most twice as many. Decisions are cached as long."""
 MOST_ROUTES: Final = 1024
-"""Components times channels; the least recently heard goes."""
+"""Limit of components times channels. The least recently heard is dropped."""
 MOST_FRAMES: Final = 8192
-"""Frames in a window; if more come, the window is shorter."""
+"""Frames in a window. More frames make the window shorter."""
 MOST_DECISIONS: Final = 4096
 
-WHOLE: Final = -1  # stands for the component where the whole system is meant
+WHOLE: Final = -1  # instead of a component: the whole system
 EVERYBODY: Final = (0, 0)
-UNCHECKED: Final = (0, -1)  # everybody, and the frame proves nothing
+UNCHECKED: Final = (0, -1)  # a broadcast with an unchecked CRC
 CAME_AGAIN: Final = object()
 
 
 class Channel(Protocol):
-    """What routing asks of a channel. It is hashable, and equal only to itself."""
+    """The properties of a channel that routing needs. Hashable, equal only to itself."""
 
     @property
     def is_out(self) -> bool:
-        """Whether it leads to ground stations rather than to vehicles."""
+        """Whether it leads to ground stations and not to vehicles."""
 
     @property
     def passive(self) -> bool:
-        """Whether nothing may ever be sent there."""
+        """Whether sending there is forbidden."""
 
 
 C = TypeVar("C", bound=Channel)
 
 
 class Router(Generic[C]):
-    """Learns who is on which channel, and says where a frame goes."""
+    """Learns which components are on which channel, and decides where a frame goes."""
 
     def __init__(self) -> None:
         self._own: frozenset[tuple[int, int]] = frozenset()
         self._heard: OrderedDict[tuple[C, int, int], float] = OrderedDict()
-        """Channel, system, component -> when; the least recently heard first."""
+        """Channel, system, component -> time; the least recently heard first."""
         self._where: dict[tuple[int, int], Counter[C]] = {}
-        """The same by (system, component) and by (system, WHOLE)."""
+        """The channels of each (system, component) and (system, WHOLE)."""
         self._channels: tuple[C, ...] = ()
         self._decisions: dict[tuple[C, tuple[int, int], tuple[int, int]], tuple[C, ...]] = {}
-        """By channel and sender and target."""
+        """By channel, sender and target."""
         self._recent: dict[int, object] = {}
-        """By hash of the frame: the channel on which it came first, or CAME_AGAIN; of this window."""
+        """The frames of this window, by hash: the channel on which each arrived first, or CAME_AGAIN."""
         self._older: dict[int, object] = {}
-        """The same, of the window before."""
+        """The frames of the previous window."""
         self._turn_at = -math.inf
 
     def speak_as(self, own: Collection[tuple[int, int]]) -> None:
-        """The systems and components that are ourselves: what comes back from or is meant for them goes nowhere."""
+        """Set our own ids. Frames from them or addressed to them are not forwarded."""
         if self._own != own:
             self._own = frozenset(own)
             self._decisions.clear()
 
     def heard(self, channel: C, system: int, component: int, now: float) -> None:
-        """A checked frame of this sender came on this channel."""
+        """Learn from a frame with a good CRC that this sender is on this channel."""
         if system == 0 or (system, component) in self._own:
             return
         route = channel, system, component
@@ -100,10 +101,10 @@ class Router(Generic[C]):
         self._heard.move_to_end(route)
 
     def destinations(self, frame: Frame, came_from: C, channels: tuple[C, ...], now: float) -> tuple[C, ...]:
-        """Where a frame goes that came on `came_from`; its sender is learned, at least once in each window.
+        """The channels that get a frame received on `came_from`. Learns its sender at least once in each window.
 
-        `frame` is a parser's that keeps `raw`. `channels` are all that may be sent to, the same tuple as long as they
-        are the same: decisions are kept that long.
+        `frame` comes from a parser that keeps `raw`. `channels` are all channels that may be sent to. Pass the same
+        tuple while they are the same: decisions are cached for that long.
         """
         if now >= self._turn_at or len(self._recent) >= MOST_FRAMES:
             self._turn(now)
@@ -126,10 +127,10 @@ class Router(Generic[C]):
     def plan(
         self, data: bytes, frames: Sequence[Frame], came_from: C, channels: tuple[C, ...], now: float
     ) -> list[tuple[bytes, tuple[C, ...]]]:
-        """What to send where of the frames that came with `data`: a datagram, or b"" where bytes come as a stream.
+        """The bytes to send, with their channels. `data` is the datagram of the frames, or b"" for a stream.
 
-        A datagram is sent as it came if it is all frames and all go to the same channels; else each frame is sent on
-        its own, without the bytes between them.
+        A datagram of frames only, all for the same channels, is forwarded unchanged. Otherwise each frame is sent
+        separately, without the bytes in between.
         """
         if len(frames) == 1:
             frame = frames[0]
@@ -143,12 +144,12 @@ class Router(Generic[C]):
         return [part for part in parts if part[1]]
 
     def _decide(self, came_from: C, sender: tuple[int, int], target: tuple[int, int]) -> tuple[C, ...]:
-        """Where frames of this sender to this target go, from all that is known now."""
+        """The channels for frames of this sender to this target."""
         if sender in self._own or target in self._own:
             return ()
         where, nowhere = self._where, Counter[C]()
-        has_it = where.get(sender, nowhere)
-        others = [c for c in self._channels if c != came_from and not c.passive and c not in has_it]
+        already = where.get(sender, nowhere)
+        others = [c for c in self._channels if c != came_from and not c.passive and c not in already]
         system, component = target
         if system:
             exact = where.get(target) if component else None
@@ -158,7 +159,7 @@ class Router(Generic[C]):
         return tuple(c for c in others if came_from.is_out or c.is_out or c in same_system)
 
     def _is_copy(self, raw: bytes, came_from: C) -> bool:
-        """Whether this frame came first on another channel, or is known to go round."""
+        """Whether this frame arrived first on another channel, or is known to loop."""
         key = hash(raw)
         first = self._recent.get(key) or self._older.get(key)
         if first is None or first == came_from:
@@ -169,7 +170,7 @@ class Router(Generic[C]):
         return True
 
     def _turn(self, now: float) -> None:
-        """Begin another window."""
+        """Start the next window."""
         self._older = self._recent if now < self._turn_at + WINDOW else {}
         self._recent = {}
         self._turn_at = now + WINDOW
@@ -189,7 +190,7 @@ class Router(Generic[C]):
 
 
 def _target(frame: Frame) -> tuple[int, int]:
-    """System and component that a frame is for; MAVLink 2 leaves trailing zeros away, and zero is everybody."""
+    """The target system and component. MAVLink 2 cuts trailing zeros; 0 is a broadcast."""
     offsets = TARGETS.get(frame.message_id)
     if offsets is None:
         return EVERYBODY if frame.message_id in CRC_EXTRA else UNCHECKED

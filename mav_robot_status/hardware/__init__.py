@@ -1,1 +1,1 @@
-"""The MAVLink hardware interface: frames in, statuses in named handles out. `robot_hw` is the way in."""
+"""What a robot is: hardware interfaces, which fill the handles of `interface`."""

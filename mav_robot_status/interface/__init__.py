@@ -1,36 +1,49 @@
-"""The contract that hardware interfaces and controllers share; see `status`, `handle`, `registry`."""
+"""The contract of hardware interfaces, controllers and publishers; see `fields`, `status`, `handle`, `hardware`."""
 
+from .controller import Controller
+from .fields import FIELDS, STATES, TRI_STATES, Field, Kind, RobotMode, RobotStatus, TriState
 from .handle import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle
+from .hardware import HardwareContext, HardwareInterface, IoSource, RobotHW
 from .metrics import ConnectionMetrics, Metrics, PublisherMetrics
+from .options import Option, Options
 from .publisher import Audience, MavlinkPort, Publisher, PublisherContext
-from .registry import IndustrialRobotStatusInterface, InterfaceManager, RobotHW
+from .registry import IndustrialRobotStatusInterface, InterfaceManager
 from .status import (
     Detail,
     ErrorCause,
     Evidence,
     Inhibit,
     LinkState,
-    RobotMode,
-    RobotStatus,
     RobotStatusMsg,
-    TriState,
     Vehicle,
 )
+from .validation import validate
 
 __all__ = [
     "DEFAULT_HANDLE_NAME",
+    "FIELDS",
+    "STATES",
+    "TRI_STATES",
     "Audience",
     "ConnectionMetrics",
+    "Controller",
     "Detail",
     "ErrorCause",
     "Evidence",
+    "Field",
+    "HardwareContext",
+    "HardwareInterface",
     "IndustrialRobotStatusHandle",
     "IndustrialRobotStatusInterface",
     "Inhibit",
     "InterfaceManager",
+    "IoSource",
+    "Kind",
     "LinkState",
     "MavlinkPort",
     "Metrics",
+    "Option",
+    "Options",
     "Publisher",
     "PublisherContext",
     "PublisherMetrics",
@@ -40,4 +53,5 @@ __all__ = [
     "RobotStatusMsg",
     "TriState",
     "Vehicle",
+    "validate",
 ]

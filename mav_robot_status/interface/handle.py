@@ -1,4 +1,4 @@
-"""`IndustrialRobotStatusHandle`: the named place where a hardware interface puts a status and controllers read it."""
+"""`IndustrialRobotStatusHandle`: a hardware interface sets a status under a name, and controllers read it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ DEFAULT_HANDLE_NAME = "industrial_robot_status_handle"
 class IndustrialRobotStatusHandle:
     """A name and the latest status under it.
 
-    ORIGINAL: the C++ handle points at a RobotStatus that the hardware interface changes in place. Here statuses are
-    values, and the hardware interface sets a new one; a reader can keep what it read.
+    ORIGINAL: the C++ handle points at a RobotStatus that the hardware interface changes in place. Here a status is
+    a value, and the hardware interface sets a new one. A reader can keep what it read.
     """
 
     __slots__ = ("detail", "evidence", "heard_at", "name", "status")
@@ -28,9 +28,9 @@ class IndustrialRobotStatusHandle:
         self.status = status if status is not None else RobotStatus()
         self.detail = Detail()
         self.heard_at: float | None = None
-        """Monotonic seconds at which the robot's controller was last heard; None if never, or not told."""
+        """When (monotonic seconds) the robot's controller was last heard; None if never or unknown."""
         self.evidence: Mapping[str, Evidence] = {}
-        """Why each field has its value; empty if the hardware interface does not tell."""
+        """Why each field has its value, by name of the field; empty if the hardware interface gives no reasons."""
 
     def __repr__(self) -> str:
         return f"IndustrialRobotStatusHandle({self.name!r}, {self.status!r})"

@@ -1,4 +1,4 @@
-"""What a gateway counts, as values: taken in its own thread, written out by whoever was asked for them."""
+"""The counters of a gateway as values. The gateway's thread reads them; a publisher writes them out."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ class ConnectionMetrics(NamedTuple):
     connection: str
     """As it was configured: `udp:0.0.0.0:14550`."""
     is_out: bool
-    """Whether it leads to ground stations rather than to vehicles."""
+    """True for an out, False for a vehicle link."""
     peers: int
-    """Ends that we speak to."""
+    """Peers that get messages from us."""
     frames: int
-    """MAVLink frames that were not damaged."""
+    """Valid MAVLink frames."""
     lost: int
     """Sequence numbers that are missing."""
     crc_errors: Mapping[int, int]
-    """By message id: frames damaged, or defined otherwise there. Under -1 those of further ids."""
+    """Frames with a bad CRC by message id. -1 counts the ids beyond the limit."""
     unknown: int
     """Frames of ids that cannot be checked."""
     incompatible: int
     """Frames with an unknown incompatibility flag."""
     garbage_bytes: int
     dropped: int
-    """What could not be sent, and what the kernel dropped on receipt."""
+    """Messages that could not be sent, and datagrams that the kernel dropped."""
 
 
 class PublisherMetrics(NamedTuple):
@@ -39,11 +39,11 @@ class PublisherMetrics(NamedTuple):
 
     type: str
     number: int
-    """Counts those of one type from 1."""
+    """The number of the publisher among those of its type, from 1."""
     queued: int
-    """What it holds and has not yet handed on."""
+    """Messages in its queue."""
     dropped: int
-    """Messages that it had no room for."""
+    """Messages that it dropped."""
 
 
 class Metrics(NamedTuple):
@@ -54,4 +54,4 @@ class Metrics(NamedTuple):
     connections: tuple[ConnectionMetrics, ...] = ()
     publishers: tuple[PublisherMetrics, ...] = ()
     record_dropped: int | None = None
-    """Frames that the recording has not; None: nothing is recorded."""
+    """Frames missing in the recording; None: nothing is recorded."""

@@ -1,4 +1,4 @@
-"""What a controller expects of the places where its statuses go, and what those are given to work with."""
+"""Publishers: what a controller requires of an output, and what the gateway provides to it."""
 
 from __future__ import annotations
 
@@ -13,60 +13,69 @@ if TYPE_CHECKING:
 
 
 class Publisher(Protocol):
-    """One output. It never blocks: what cannot take a message now says so, and is asked again soon after."""
+    """One output. No method blocks: a publisher that cannot accept a message is `busy`, and is tried again soon.
+
+    A publisher class may set two more attributes. Both default to False:
+
+    - `live_only`: a replay of a recorded log runs without this publisher. Set it if receivers use the
+      messages as the present state of the robot: a ground station, a broker, a live page.
+    - `durable`: the publisher stores each change before `publish` returns. Durable publishers run first, so that no
+      other output shows a change that a crash can still lose.
+    """
 
     periodic: bool
-    """False if only changes are wanted here."""
+    """False: this publisher takes changes only, and no periodic messages."""
 
     def busy(self) -> bool:
-        """True while a message cannot be taken (realtime_tools' trylock that fails)."""
+        """True while it cannot accept a message (a failed trylock of realtime_tools)."""
 
     def publish(self, msg: RobotStatusMsg) -> None:
-        """Take a message; only called while not busy."""
+        """Accept a message. Only called while not busy."""
 
     def service(self, now: Instant) -> float | None:
-        """Do what is waiting (a rest of a line, a change held back); when to be called again, None if nothing waits."""
+        """Do pending work: the rest of a line, a change that was held back. Return when to be called again (monotonic
+        seconds), or None if nothing waits."""
 
     def close(self) -> None:
-        """The last call: send what is left, let go of what is held."""
+        """The last call: send the remaining messages and release all resources. A second call does nothing."""
 
 
 class Audience(NamedTuple):
-    """Somebody who hears MAVLink from us: an output, or one peer on a link."""
+    """A receiver of our MAVLink: an out, or one peer on a link."""
 
     key: Hashable
-    """Stays the same for as long as the audience is there."""
+    """Identifies the audience for as long as it exists."""
     interval: float | None = None
-    """Seconds between two ROBOT_STATUS, as asked for with MAV_CMD_SET_MESSAGE_INTERVAL, whichever vehicle they are
-    about. None: the default. inf: none are wanted."""
+    """Seconds between two ROBOT_STATUS of one vehicle, as set with MAV_CMD_SET_MESSAGE_INTERVAL. None: the default.
+    inf: no messages."""
     mirror: bool = False
-    """True if ground stations are there, which may not know ROBOT_STATUS; False towards a vehicle."""
+    """True for ground stations, which may not know ROBOT_STATUS; False for a vehicle."""
 
 
 class MavlinkPort(Protocol):
-    """Where MAVLink goes out, under our identity."""
+    """Sends MAVLink with our identity."""
 
     def audiences(self) -> Sequence[Audience]:
-        """Everyone who hears what we say about vehicles, now."""
+        """The present receivers of messages about vehicles."""
 
     def requests(self) -> Collection[tuple[Hashable, int]]:
-        """Who asked, since the last call, for one ROBOT_STATUS: keys of audiences, and system ids of vehicles."""
+        """Requests for one ROBOT_STATUS since the last call: key of the audience, system id of the vehicle."""
 
     def send(self, message: Any, system: int, audience: Audience) -> None:
         """Send a message of `mavlink.definitions` about the vehicle with this system id."""
 
 
 class PublisherContext(NamedTuple):
-    """What a publisher is created with."""
+    """The arguments of a publisher."""
 
     options: Mapping[str, object]
-    """The options of its mapping in the configuration."""
+    """The options of its mapping in the configuration; see `options`."""
     mavlink: MavlinkPort
     stdout: TextIO
     patient: bool = False
-    """True on replay: nothing is lost to a slow reader, the log waits instead."""
+    """True on replay: the log waits for a slow reader, and no message is lost."""
     explain: Callable[[str, Instant], Mapping[str, Any] | None] | None = None
-    """Why each field of a handle has its value, as `explain --as-json` tells it; None for an unknown handle, or one
-    whose vehicle was not heard. Only for the gateway's own thread, and not for free: a tenth of a millisecond."""
+    """The evidence for each field of a handle, as `explain --as-json` prints it; None for an unknown handle or a
+    vehicle that was not heard. Only the gateway's thread may call it. It takes 0.1 ms."""
     metrics: Callable[[Instant], Metrics] | None = None
-    """What the gateway counts and what is so now, as `/metrics` tells it. Only for the gateway's own thread."""
+    """The present values and counters, as `/metrics` prints them. Only the gateway's thread may call it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, TypeVar
 
 from ..errors import MavRobotStatusError, UnknownHandleError
@@ -25,14 +25,17 @@ class IndustrialRobotStatusInterface:
     def __len__(self) -> int:
         return len(self._handles)
 
+    def __iter__(self) -> Iterator[IndustrialRobotStatusHandle]:
+        return iter(self._handles.values())
+
     def register_handle(self, handle: IndustrialRobotStatusHandle) -> None:
-        """Make a handle known. A second registration of a name replaces the first, with a warning in the log."""
+        """Register a handle. A second registration of a name replaces the first, with a warning in the log."""
         if handle.name in self._handles:
             log.warning("replacing the handle '%s', which was registered before", handle.name)
         self._handles[handle.name] = handle
 
     def get_handle(self, name: str) -> IndustrialRobotStatusHandle:
-        """The handle of that name. Raises UnknownHandleError, which lists the names there are."""
+        """The handle of that name. Raises UnknownHandleError, which lists the registered names."""
         try:
             return self._handles[name]
         except KeyError:
@@ -63,7 +66,3 @@ class InterfaceManager:
             wanted = getattr(kind, "__name__", kind)
             raise MavRobotStatusError(f"this hardware offers no {wanted}")
         return interface  # type: ignore[no-any-return]
-
-
-class RobotHW(InterfaceManager):
-    """ros_control's RobotHW: reads the robot into the handles, and writes what it has to say to the robot."""

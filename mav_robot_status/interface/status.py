@@ -1,45 +1,28 @@
-"""What a robot's status is: the port of `industrial_robot_status_interface.h`, and what MAVLink can tell beyond it.
-
-Numbers are those of industrial_msgs: TriState -1/0/1, RobotMode -1/1/2 (there is no 0).
-"""
+"""The values of the interface: a RobotStatus (the port of `industrial_robot_status_interface.h`) and its details."""
 
 from __future__ import annotations
 
-from enum import Enum, IntEnum
+from enum import Enum
 from typing import NamedTuple
 
+from .fields import RobotMode, RobotStatus, TriState
 
-class TriState(IntEnum):
-    """industrial_msgs/TriState: unknown is a value of its own and never means false."""
-
-    UNKNOWN = -1
-    FALSE = 0
-    TRUE = 1
-
-
-class RobotMode(IntEnum):
-    """industrial_msgs/RobotMode: who moves the robot, a person (MANUAL) or a program (AUTO)."""
-
-    UNKNOWN = -1
-    MANUAL = 1
-    AUTO = 2
-
-
-class RobotStatus(NamedTuple):
-    """The seven fields of industrial_msgs/RobotStatus; as created, nothing is known."""
-
-    mode: RobotMode = RobotMode.UNKNOWN
-    e_stopped: TriState = TriState.UNKNOWN
-    drives_powered: TriState = TriState.UNKNOWN
-    motion_possible: TriState = TriState.UNKNOWN
-    in_motion: TriState = TriState.UNKNOWN
-    in_error: TriState = TriState.UNKNOWN
-    error_code: int = 0
-    """0: no error. Non-zero if and only if in_error is TRUE."""
+__all__ = [
+    "Detail",
+    "ErrorCause",
+    "Evidence",
+    "Inhibit",
+    "LinkState",
+    "RobotMode",
+    "RobotStatus",
+    "RobotStatusMsg",
+    "TriState",
+    "Vehicle",
+]
 
 
 class LinkState(str, Enum):
-    """What is known of the connection to the robot's controller."""
+    """The state of the connection to the robot's controller (of a MAVLink vehicle: its autopilot)."""
 
     NEVER_SEEN = "NEVER_SEEN"
     CONNECTED = "CONNECTED"
@@ -50,49 +33,62 @@ class ErrorCause(NamedTuple):
     """One active reason for in_error."""
 
     code: int
+    """Non-zero."""
     name: str
+    """Capitals, digits and underscores: `BATTERY_LOW`."""
     text: str | None
-    """The autopilot's own words, where it said any."""
+    """The text that the robot's controller sent; None if it sent none."""
     since_us: int
-    """Unix microseconds at which the cause was first seen."""
+    """When the cause became active: Unix microseconds."""
 
 
 class Inhibit(NamedTuple):
     """One reason why motion is not possible."""
 
-    bit: int
-    """Its bit in ROBOT_STATUS.inhibit_flags."""
     name: str
+    """Capitals, digits and underscores: `DISARMED`."""
     text: str | None
+    """The text that the robot's controller sent; None if it sent none."""
     since_us: int
+    """When the reason became active: Unix microseconds."""
 
 
 class Vehicle(NamedTuple):
-    """What the autopilot says of itself; MAVLink's names without prefix, an unknown number as text."""
+    """What the robot's controller reports about itself. A field that it does not report is None.
+
+    Of a MAVLink vehicle: MAVLink's names without their prefix; an unknown number is the number as text.
+    """
 
     autopilot: str | None = None
+    """The kind of controller: `ARDUPILOTMEGA`; of an arm, its maker's name for it."""
     type: str | None = None
+    """The kind of robot: `GROUND_ROVER`; of an arm, its model."""
     flight_mode: str | None = None
+    """The operating mode, by the controller's own name."""
     custom_mode: int | None = None
+    """HEARTBEAT.custom_mode, 0 to 4294967295. None for every other robot."""
     state: str | None = None
+    """The state of the controller: MAV_STATE; of an arm, the controller's own name."""
 
 
 class Evidence(NamedTuple):
-    """Why a field has its value: the rule that decided and the message that it read."""
+    """Why a field has its value: the rule that applied and the message that it read."""
 
     rule: str
-    """What was concluded from what, in words."""
+    """The rule, as a short sentence."""
     source: str | None = None
-    """The deciding message, with its bit, field or text."""
+    """The message that decided, with its bit, field or text."""
     at: float | None = None
     """When that message arrived: seconds on the monotonic clock."""
 
 
 class Detail(NamedTuple):
-    """What goes with a RobotStatus of a MAVLink vehicle. A hardware interface of one's own may leave it as created."""
+    """The details of a RobotStatus. A hardware interface may leave them as created."""
 
     system: int | None = None
+    """The MAVLink system id, 1 to 255. None for a robot that is not a MAVLink vehicle."""
     component: int | None = None
+    """The MAVLink component id of the autopilot, 1 to 255. None for a robot that is not a MAVLink vehicle."""
     errors: tuple[ErrorCause, ...] = ()
     """Every active cause, the most important first."""
     inhibits: tuple[Inhibit, ...] = ()
@@ -102,11 +98,11 @@ class Detail(NamedTuple):
 
 
 class RobotStatusMsg(NamedTuple):
-    """What a controller hands to its publishers: a status, whose it is, and when it was so."""
+    """What a controller passes to its publishers: the status of one handle at one moment."""
 
     handle: str
     unix_us: int
-    """The stamp of the controller's update."""
+    """When the controller was updated: Unix microseconds."""
     status: RobotStatus
     detail: Detail
     heartbeat_age: float | None

@@ -1,8 +1,8 @@
-"""Commands to us: a consumer wants ROBOT_STATUS more often, less often, or once.
+"""Commands to us: a consumer requests ROBOT_STATUS more often, less often, or once.
 
-Only what is addressed to exactly us is answered. A command to all components is the autopilot's to answer: a refusal of
-ours beside its acknowledgement would make the sender believe that it was refused. Results are those of MAV_RESULT in
-common.xml: DENIED for a message that we do not send, UNSUPPORTED for a command that we do not know.
+We answer only commands with our exact address. The autopilot answers a command to all components: an additional denial
+from us would look like a denial by the autopilot. The results are those of MAV_RESULT in common.xml: DENIED for a
+message that we do not send, UNSUPPORTED for an unknown command.
 """
 
 from __future__ import annotations
@@ -10,45 +10,51 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from . import enumerations
 from .definitions import CommandAck, MessageInterval
+from .enumerations import MAV_CMD_GET_MESSAGE_INTERVAL as GET_MESSAGE_INTERVAL
+from .enumerations import MAV_CMD_REQUEST_MESSAGE as REQUEST_MESSAGE
+from .enumerations import MAV_CMD_SET_MESSAGE_INTERVAL as SET_MESSAGE_INTERVAL
+from .enumerations import MAV_RESULT_ACCEPTED as ACCEPTED
+from .enumerations import MAV_RESULT_DENIED as DENIED
+from .enumerations import MAV_RESULT_UNSUPPORTED as UNSUPPORTED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Container
 
     from .definitions import CommandInt, CommandLong
 
-HEARTBEAT, MESSAGE_INTERVAL, ROBOT_STATUS = 0, 244, 59900
-GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512  # MAV_CMD
-ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3  # MAV_RESULT
-DISABLED, DEFAULT = -1, 0  # microseconds that mean something else
+HEARTBEAT, MESSAGE_INTERVAL = enumerations.MAVLINK_MSG_ID_HEARTBEAT, enumerations.MAVLINK_MSG_ID_MESSAGE_INTERVAL
+ROBOT_STATUS: Final = enumerations.MAVLINK_MSG_ID_ROBOT_STATUS
+DISABLED, DEFAULT = -1, 0  # intervals with a special meaning
 
 PERIODS: Final = {HEARTBEAT: 1.0, ROBOT_STATUS: 1.0}
-"""What we send and can be asked for: message id -> seconds between two, unless asked for otherwise."""
+"""The messages that can be requested: message id -> default interval in seconds."""
 SHORTEST: Final = 0.05
-"""Seconds: who asks for less gets this."""
+"""The shortest interval in seconds; a shorter request is raised to this."""
 LONGEST_US: Final = 2**31 - 1
-"""MESSAGE_INTERVAL cannot tell more microseconds."""
+"""The longest interval in microseconds that MESSAGE_INTERVAL can state."""
 LAST_ID: Final = 2**16 - 1
-"""MESSAGE_INTERVAL cannot tell of a message with a higher id."""
+"""The highest message id that MESSAGE_INTERVAL can state."""
 
 
 class Answer(NamedTuple):
-    """What to reply to the sender of a command, and what to do."""
+    """The replies to the sender of a command, and the action that follows."""
 
     system: int
-    """The system id that was addressed, and that the replies come from."""
+    """The system id that was addressed. The replies are sent with this id."""
     replies: tuple[CommandAck | MessageInterval, ...]
     interval: float | None
-    """From now on, seconds between two ROBOT_STATUS to where the command came from; None: the default; inf: none."""
+    """The new interval of ROBOT_STATUS to the sender, in seconds; None: the default; inf: none are sent."""
     once: int | None
-    """The id of a message to send there once, behind the replies: HEARTBEAT or ROBOT_STATUS."""
+    """The id of a message to send once after the replies: HEARTBEAT or ROBOT_STATUS."""
 
 
 class _Outcome(NamedTuple):
     result: int
     interval: float | None
     once: int | None = None
-    told: MessageInterval | None = None
+    interval_message: MessageInterval | None = None
 
 
 def answer(
@@ -58,36 +64,37 @@ def answer(
     interval: float | None = None,
     offered: Container[float] = frozenset(PERIODS),
 ) -> Answer | None:
-    """The answer to a command, None if it is not for us. Never raises; a command that is repeated does no more.
+    """The answer to a command; None if it is not addressed to us. Never raises. Repeating a command has no effect.
 
-    `sender` and `is_us` are in system and component ids, `interval` is that of the last answer to a command that came
-    the same way. `offered` are the messages of PERIODS that are sent: a heartbeat may be switched off, for example.
+    `sender` and the arguments of `is_us` are system id and component id. `interval` is the `Answer.interval` of the
+    previous command on the same channel. `offered` are the messages of PERIODS that are sent: for example, the
+    heartbeat may be switched off.
     """
     if not is_us(message.target_system, message.target_component):
         return None
     handle = COMMANDS.get(message.command)
     outcome = _Outcome(UNSUPPORTED, interval) if handle is None else handle(message, interval, offered)
     ack = CommandAck(message.command, outcome.result, 0, 0, *sender)
-    replies = (ack,) if outcome.told is None else (ack, outcome.told)
+    replies = (ack,) if outcome.interval_message is None else (ack, outcome.interval_message)
     return Answer(message.target_system, replies, outcome.interval, outcome.once)
 
 
-# A parameter is a float: 59900.0 is found among ints; NaN and fractions are not, and fail every comparison.
+# A parameter is a float: 59900.0 equals the int; NaN and fractions equal no id, and NaN fails every comparison.
 
 
 def _request(message: CommandLong | CommandInt, interval: float | None, offered: Container[float]) -> _Outcome:
-    if message.param1 == MESSAGE_INTERVAL:  # the newer way to write GET_MESSAGE_INTERVAL
-        return _tell(message.param2, interval, offered)
+    if message.param1 == MESSAGE_INTERVAL:  # replaces GET_MESSAGE_INTERVAL in newer versions of MAVLink
+        return _message_interval(message.param2, interval, offered)
     if message.param1 not in offered:
         return _Outcome(DENIED, interval)
     return _Outcome(ACCEPTED, interval, once=int(message.param1))
 
 
 def _get(message: CommandLong | CommandInt, interval: float | None, offered: Container[float]) -> _Outcome:
-    return _tell(message.param1, interval, offered)
+    return _message_interval(message.param1, interval, offered)
 
 
-def _tell(message_id: float, interval: float | None, offered: Container[float]) -> _Outcome:
+def _message_interval(message_id: float, interval: float | None, offered: Container[float]) -> _Outcome:
     """MESSAGE_INTERVAL: -1 is disabled, 0 is not available."""
     if not 0 <= message_id <= LAST_ID or message_id % 1:
         return _Outcome(DENIED, interval)
@@ -97,14 +104,14 @@ def _tell(message_id: float, interval: float | None, offered: Container[float]) 
         us = round(PERIODS[int(message_id)] * 1e6)
     else:
         us = DISABLED if interval == math.inf else round(interval * 1e6)
-    return _Outcome(ACCEPTED, interval, told=MessageInterval(us, int(message_id)))
+    return _Outcome(ACCEPTED, interval, interval_message=MessageInterval(us, int(message_id)))
 
 
 def _set(message: CommandLong | CommandInt, interval: float | None, offered: Container[float]) -> _Outcome:
     message_id, us = message.param1, message.param2
     if message_id not in offered or not (us in (DISABLED, DEFAULT) or 0 < us <= LONGEST_US):
         return _Outcome(DENIED, interval)
-    if message_id != ROBOT_STATUS:  # the heartbeat stays as it is
+    if message_id != ROBOT_STATUS:  # the interval of the heartbeat is fixed
         return _Outcome(ACCEPTED if us in (DEFAULT, PERIODS[int(message_id)] * 1e6) else DENIED, interval)
     if us in (DISABLED, DEFAULT):
         return _Outcome(ACCEPTED, math.inf if us == DISABLED else None)

@@ -1,8 +1,8 @@
-"""Who we are on MAVLink: a companion's component beside each vehicle's autopilot.
+"""Our identity on MAVLink: a companion computer beside the autopilot of each vehicle.
 
-What we say about a vehicle carries that vehicle's system id and our component: MAV_COMP_ID_ONBOARD_COMPUTER2 (192),
-since 191 is MAVROS's. Never a ground station, which would mask a lost one. If another program speaks as our component,
-the next free one is taken.
+A message about a vehicle has the system id of that vehicle and our component id, MAV_COMP_ID_ONBOARD_COMPUTER2 (192);
+MAVROS uses 191. We never identify as a ground station: that would hide the loss of a real one. If another program uses
+our component id, we change to the next free one.
 """
 
 from __future__ import annotations
@@ -13,6 +13,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from .definitions import Heartbeat
 from .encode import Encoder
+from .enumerations import (
+    MAV_AUTOPILOT_INVALID,
+    MAV_STATE_ACTIVE,
+    MAV_STATE_CRITICAL,
+    MAV_TYPE_ONBOARD_CONTROLLER,
+)
 
 if TYPE_CHECKING:
     from .framing import Frame
@@ -20,46 +26,45 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 COMPONENTS: Final = (192, 193, 194, 191)
-LONELY_SYSTEM: Final = 245
-"""The system id before any vehicle is heard, on links where we must speak first."""
-ONBOARD_CONTROLLER, INVALID = 18, 8  # MAV_TYPE, MAV_AUTOPILOT
-ACTIVE, CRITICAL = 4, 5  # MAV_STATE
+DEFAULT_SYSTEM: Final = 245
+"""The system id before the first vehicle is known, on links where we must send first."""
 MAVLINK_VERSION: Final = 3
-REMEMBERED: Final = 64
-"""Heartbeats of ours, for each system, that are known again if a router sends them back: of several channels."""
+SENT_KEPT: Final = 64
+"""How many of our heartbeats we remember for each system, over all channels: a router may send them back to us."""
 
 
 class Component:
-    """Encodes what we send, about one or several vehicles, under one component id."""
+    """Encodes our messages about one or several vehicles, with one component id."""
 
     def __init__(self, component: int = COMPONENTS[0], system: int | None = None) -> None:
         self.id = component
         self._system = system
         self._ids = (component, *(c for c in COMPONENTS if c != component))
         self._others: set[tuple[int, int]] = set()
-        """Systems and components of `_ids` that other programs speak as: at most 255 times 5."""
+        """Ids that other programs use, if the component is one of `_ids`: at most 255 times 5."""
         self._encoders: dict[int, Encoder] = {}
         self._systems: set[int] = set()
-        """Systems that we speak for."""
+        """Systems under whose id we have sent."""
         self._sent: dict[int, deque[tuple[int, int, Heartbeat]]] = {}
 
     def system_for(self, vehicle: int) -> int:
-        """Our system id when we speak about this vehicle."""
+        """Our system id in messages about this vehicle."""
         return vehicle if self._system is None else self._system
 
     def speaks_as(self, system: int, component: int) -> bool:
-        """Whether these are ids that we have spoken under."""
+        """Whether we have sent with these ids."""
         return component == self.id and system in self._systems
 
     def frame(self, message: Any, vehicle: int, encoders: dict[int, Encoder] | None = None) -> bytes:
         """The next frame with `message` about the vehicle with this system id.
 
-        `encoders` are those of the channel that it goes to, each channel counting for itself; None: there is just one.
+        `encoders` belong to the channel of the receiver, because each channel counts its own frames; None: there is
+        only one channel.
         """
         system = self.system_for(vehicle)
         if system not in self._systems:
             self._systems.add(system)
-            self._step_aside(system)
+            self._change_component(system)
         encoders = self._encoders if encoders is None else encoders
         encoder = encoders.get(system)
         if encoder is None or encoder.component != self.id:
@@ -67,34 +72,40 @@ class Component:
         sequence = encoder.sequence
         frame = encoder.frame(message)
         if type(message) is Heartbeat:
-            sent = self._sent.setdefault(system, deque(maxlen=REMEMBERED))
+            sent = self._sent.setdefault(system, deque(maxlen=SENT_KEPT))
             sent.append((self.id, sequence, message))
         return frame
 
     def heartbeat(self, vehicle: int, in_error: bool = False, encoders: dict[int, Encoder] | None = None) -> bytes:
-        """Our HEARTBEAT; its state mirrors the vehicle's in_error."""
-        state = CRITICAL if in_error else ACTIVE
-        return self.frame(Heartbeat(0, ONBOARD_CONTROLLER, INVALID, 0, state, MAVLINK_VERSION), vehicle, encoders)
+        """Our HEARTBEAT. Its system_status is CRITICAL if the vehicle is in error."""
+        state = MAV_STATE_CRITICAL if in_error else MAV_STATE_ACTIVE
+        message = Heartbeat(0, MAV_TYPE_ONBOARD_CONTROLLER, MAV_AUTOPILOT_INVALID, 0, state, MAVLINK_VERSION)
+        return self.frame(message, vehicle, encoders)
 
-    def heard(self, frame: Frame) -> None:
-        """Look at a HEARTBEAT: if another program speaks as we do, or as we could, keep out of its way."""
+    def observe(self, frame: Frame) -> None:
+        """Process a received HEARTBEAT: if another program uses our component id, change ours."""
         system, component = frame.ids
         if component not in self._ids:
             return
         if (component, frame.sequence, frame.message) in self._sent.get(system, ()):
-            return  # our own, come back through a router
+            return  # ours: a router has sent it back
         if frame.ids not in self._others:
             self._others.add(frame.ids)
-            self._step_aside(system)
+            self._change_component(system)
 
-    def _step_aside(self, system: int) -> None:
-        """Take another component if ours is taken in a system that we speak for. Each is left only once."""
+    def _change_component(self, system: int) -> None:
+        """Change to a free component id if ours is in use in one of our systems. Leaves each id only once."""
         if system not in self._systems or (system, self.id) not in self._others:
             return
-        taken = {component for s, component in self._others if s in self._systems}
-        free = next((c for c in self._ids if c not in taken), None)
+        used = {component for s, component in self._others if s in self._systems}
+        free = next((c for c in self._ids if c not in used), None)
         if free is None:
-            log.warning("other programs speak as %s in system %d: staying %d", self._ids, system, self.id)
+            log.warning(
+                "other programs use all of the components %s in system %d: keeping component %d",
+                self._ids,
+                system,
+                self.id,
+            )
             return
-        log.warning("another program speaks as %d/%d: taking component %d", system, self.id, free)
+        log.warning("another program uses the ids %d/%d: changing to component %d", system, self.id, free)
         self.id = free

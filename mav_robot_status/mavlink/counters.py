@@ -1,4 +1,4 @@
-"""What came in on a link or in a log, counted by kind: what was read, and why the rest was not."""
+"""Counters of one link or log: the frames that were read, and the reasons why other bytes were not."""
 
 from __future__ import annotations
 
@@ -6,34 +6,34 @@ from dataclasses import dataclass, field
 from typing import Final
 
 MAX_IDS: Final = 256
-"""So many ids have a counter of their own in each table of `Counters`."""
+"""The most ids with a separate counter in each table of `Counters`."""
 OTHER_IDS: Final = -1
-"""The key under which the ids beyond MAX_IDS are counted."""
+"""The key that counts all ids beyond MAX_IDS."""
 
 
 @dataclass(slots=True)
 class Counters:
-    """What came in, by kind; all counted since the parser was made."""
+    """All counts start when the parser is created."""
 
     frames: int = 0
-    """Frames of known ids with a good CRC, wanted or not."""
+    """Frames of known ids with a valid CRC, wanted or not."""
     frames_v1: int = 0
-    """Those of them in MAVLink 1."""
+    """The part of `frames` in MAVLink 1."""
     signed: int = 0
-    """Those of them with a signature, verified or not."""
+    """The part of `frames` with a signature, verified or not."""
     lost: int = 0
-    """Frames missing from the sequence of their source. Modulo 256: an outage can hide multiples of 256."""
+    """Gaps in the sequence numbers of each source. The numbers are modulo 256: an outage can hide multiples of 256."""
     incompatible: int = 0
-    """Frames of known ids with a good CRC whose incompatibility flags have an unknown bit: not delivered."""
+    """Frames of known ids with a valid CRC and an unknown incompatibility flag; they are not delivered."""
     garbage_bytes: int = 0
     """Bytes skipped in search of the next frame."""
     bad_crc: dict[int, int] = field(default_factory=dict)
-    """By message id: damaged frames, and frames of a definition other than ours."""
+    """By message id: damaged frames, and frames of a different definition."""
     unknown: dict[int, int] = field(default_factory=dict)
-    """By message id: frames whose CRC_EXTRA is not known, so that they cannot be checked."""
+    """By message id: frames that cannot be checked, because their CRC_EXTRA is not known."""
 
     def add(self, other: Counters) -> None:
-        """Add what another parser counted."""
+        """Add the counts of another parser."""
         self.frames += other.frames
         self.frames_v1 += other.frames_v1
         self.signed += other.signed
@@ -46,7 +46,7 @@ class Counters:
 
 
 def count(table: dict[int, int], message_id: int, number: int = 1) -> None:
-    """Add to the counter of an id, or to that of OTHER_IDS once the table is full."""
+    """Add to the counter of an id, or to OTHER_IDS if the table is full."""
     if message_id not in table and len(table) >= MAX_IDS:
         message_id = OTHER_IDS
     table[message_id] = table.get(message_id, 0) + number

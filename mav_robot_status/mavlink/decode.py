@@ -1,4 +1,4 @@
-"""From a payload to its message, for the few messages that we read."""
+"""From payloads to messages, for the messages of `definitions`."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ if TYPE_CHECKING:
 
 
 Reader = tuple[type, int, "Callable[..., tuple[Any, ...]]"]
-"""How one kind of message is read: its type, the bytes up to the last field that we know, and what unpacks the known
-fields of a payload, from an offset on.
+"""The reader of one message: its type, the bytes up to the last known field, and the function that unpacks the known
+fields of a payload from an offset on.
 
-A payload that MAVLink 2 trimmed, or that an older definition without the extension fields made shorter, is filled up
-with zeros before; bytes beyond the layout (a newer definition) are ignored. A plain tuple is taken apart in a third of
-the time.
+The caller fills a short payload with zeros: MAVLink 2 removes trailing zeros, and an older definition lacks extension
+fields. Bytes beyond the layout (a newer definition) are ignored. A plain tuple unpacks in a third of the time.
 """
 
 READERS: Final[dict[int, Reader]] = {d.id: (d.type, d.layout.size, d.layout.unpack_from) for d in MESSAGES.values()}
-"""By message id: for those in MESSAGES."""
+"""By message id, for all of MESSAGES."""
 
 
 def text(raw: bytes) -> str:
-    """The text in a char array: up to the first NUL, if there is one; what is not UTF-8 becomes U+FFFD."""
+    """The text in a char array, up to the first NUL. Bytes that are not UTF-8 become U+FFFD."""
     return raw.split(b"\0", 1)[0].decode("utf-8", "replace")

@@ -1,4 +1,4 @@
-"""The dialect for other tools: its XML, and a dissector for Wireshark made from it by pymavlink's generator."""
+"""The dialect for other tools: its XML, and a Wireshark dissector that pymavlink's generator makes from it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NAME: Final = "mav_robot_status"
 INCLUDED: Final = ("common", "standard", "minimal")
 
 ANY_PORT: Final = """
--- any other UDP port: a datagram that is whole MAVLink frames and nothing else
+-- any other UDP port: a datagram that contains only whole MAVLink frames
 
 local function only_frames(buffer)
     local offset = 0
@@ -38,18 +38,18 @@ mavlink_proto:register_heuristic("udp", function(buffer, pinfo, tree)
     return true
 end)
 """
-"""Lua: the generated dissector knows three UDP ports, and a vehicle or an `--out` may use any."""
+"""Lua: the generated dissector registers three UDP ports; a vehicle or an `--out` may use any port."""
 
 
 def xml_path() -> Path:
-    """Where our XML is: in the installed package, or beside it in a checkout."""
+    """The path of our XML: in the installed package, or in `dialects/` of a checkout."""
     package = Path(__file__).resolve().parents[1]
     installed = package / "data" / f"{NAME}.xml"
     return installed if installed.exists() else package.parent / "dialects" / f"{NAME}.xml"
 
 
 def write_files(folder: str) -> list[Path]:
-    """Write the XML with what it includes, and the Lua dissector, into `folder`. Raises LinkError if it cannot."""
+    """Write our XML and the Lua dissector into `folder`. Raises LinkError if that fails."""
     from pymavlink import dialects
     from pymavlink.generator import mavgen
 

@@ -1,4 +1,4 @@
-"""Messages in, frames out: the sending half of `framing`."""
+"""Messages in, frames out: the counterpart of `framing`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from binascii import crc_hqx
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from .definitions import CRC_EXTRA, MESSAGES
-from .wire import MIRROR, V1, V2
+from .wire import REVERSED, V1, V2
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +16,7 @@ HEADER_V1: Final = struct.Struct("<BBBBBB").pack
 HEADER_V2: Final = struct.Struct("<BBBBBBBHB").pack
 CHECKSUM: Final = struct.Struct(">H").pack
 
-# type of the message -> its id, the bytes of its payload, the packing of its fields
+# class of the message -> its id, the size of its payload, the function that packs its fields
 LAYOUTS: Final[dict[type, tuple[int, int, Callable[..., bytes]]]] = {
     d.type: (d.id, d.size, d.layout.pack) for d in MESSAGES.values()
 }
@@ -25,9 +25,11 @@ LAYOUTS: Final[dict[type, tuple[int, int, Callable[..., bytes]]]] = {
 def encode(message: NamedTuple, *, system: int, component: int, sequence: int, version: int = 2) -> bytes:
     """The unsigned frame of one message of `definitions`; `sequence` is 0 to 255, `version` 1 or 2.
 
-    MAVLink 2 cuts trailing zeros off the payload but keeps one byte; MAVLink 1 carries the payload whole, extension
-    fields included, as pymavlink writes it. Raises ValueError for a programmer's mistake: a type that is no message, a
-    value that does not fit its field or the header, an id over 255 in MAVLink 1. Arrays are cut or zero-filled to fit.
+    MAVLink 2 removes trailing zeros of the payload but keeps one byte. MAVLink 1 has the whole payload with its
+    extension fields, as pymavlink writes it. Arrays are truncated or filled with zeros.
+
+    Raises ValueError for a class that is not a message, a value that does not fit its field or the header, and an id
+    over 255 in MAVLink 1.
     """
     try:
         message_id, size, pack = LAYOUTS[type(message)]
@@ -42,7 +44,7 @@ def encode(message: NamedTuple, *, system: int, component: int, sequence: int, v
 
 
 def enclose(message_id: int, payload: bytes, *, system: int, component: int, sequence: int, version: int = 2) -> bytes:
-    """The unsigned frame of a payload as it is; the id is one of CRC_EXTRA.
+    """The unsigned frame of a payload, which is not changed; the id is one of CRC_EXTRA.
 
     Raises struct.error if a value does not fit.
     """
@@ -51,17 +53,17 @@ def enclose(message_id: int, payload: bytes, *, system: int, component: int, seq
         frame = HEADER_V2(V2, len(payload), 0, 0, sequence, system, component, id_low, id_high) + payload
     else:
         frame = HEADER_V1(V1, len(payload), sequence, system, component, message_id) + payload
-    return with_crc(frame, MIRROR[CRC_EXTRA[message_id] : CRC_EXTRA[message_id] + 1])
+    return with_crc(frame, REVERSED[CRC_EXTRA[message_id] : CRC_EXTRA[message_id] + 1])
 
 
 def with_crc(frame: bytes, crc_extra: bytes) -> bytes:
-    """A frame that ends with its payload, completed; `crc_extra` is one byte, its bits mirrored."""
-    crc = crc_hqx(crc_extra, crc_hqx(frame[1:].translate(MIRROR), 0xFFFF))
-    return frame + CHECKSUM(crc).translate(MIRROR)
+    """Append the CRC to a frame that ends with its payload; `crc_extra` is one byte with reversed bits."""
+    crc = crc_hqx(crc_extra, crc_hqx(frame[1:].translate(REVERSED), 0xFFFF))
+    return frame + CHECKSUM(crc).translate(REVERSED)
 
 
 class Encoder:
-    """Frames of one source, numbered in sequence: each link needs an encoder of its own."""
+    """Frames of one source with consecutive sequence numbers. Each channel needs its own encoder."""
 
     __slots__ = ("component", "sequence", "system")
 
@@ -72,7 +74,7 @@ class Encoder:
         """The sequence number of the next frame."""
 
     def frame(self, message: NamedTuple) -> bytes:
-        """The next frame, in MAVLink 2. Raises ValueError as `encode` does; the number is then not used up."""
+        """The next frame, in MAVLink 2. Raises ValueError as `encode` does; then the sequence number is not used."""
         frame = encode(message, system=self.system, component=self.component, sequence=self.sequence)
         self.sequence = (self.sequence + 1) & 255
         return frame

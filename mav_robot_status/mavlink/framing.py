@@ -1,9 +1,9 @@
-"""Bytes in, frames out: MAVLink 1 and 2 without any input or output of its own.
+"""Bytes in, frames out: a parser for MAVLink 1 and 2 without I/O.
 
-`Parser` walks from frame to frame by the length in each header and checks the CRC of every frame whose id is in
-`definitions.CRC_EXTRA`; only wanted frames become values. It is either *in step*, where a header is believed
-far enough to skip a frame that cannot be checked, or *hunting*, where nothing but a whole frame with a good CRC counts.
-So a wrong length byte cannot swallow the good frames behind it, and no damaged frame is counted twice.
+`Parser` goes from frame to frame by the length in each header, and checks the CRC of every frame whose id is in
+`definitions.CRC_EXTRA`. Only wanted frames become values. The parser has two states. *In sync* it trusts a header far
+enough to skip a frame that it cannot check. *Out of sync* it accepts only a whole frame with a valid CRC. So a wrong
+length byte cannot hide the valid frames behind it, and no damaged frame is counted twice.
 """
 
 from __future__ import annotations
@@ -14,38 +14,39 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from .counters import Counters, count
 from .definitions import CRC_EXTRA
-from .wire import BACK, FORMATS, MAGIC, MIRROR, SIGNED, UNKNOWN, V1, V2, known_ids
+from .wire import FORMATS, MAGIC, REVERSED, SIGNED, UNDO, UNKNOWN, V1, V2, known_ids
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
 MAX_SOURCES: Final = 1024
-"""So many (system, component) pairs are watched for lost frames; a further one only until another speaks."""
-STAMP = struct.Struct(">Q").unpack_from  # before each frame of a recorded log: microseconds since 1970
+"""The most (system, component) pairs that are checked for lost frames. A further one is checked only until another
+sends."""
+STAMP = struct.Struct(">Q").unpack_from  # precedes each frame of a recorded log: microseconds since 1970
 STAMP_SIZE: Final = 8
-LATE = 240  # a gap this long is a frame that came up to 16 places late, or twice, rather than 240 lost ones
-NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; looking it up is quicker than counting
+LATE = 240  # a gap this long means a frame up to 16 places late, or a duplicate; not 240 lost frames
+NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; a lookup is faster than the arithmetic
 VALID, OPEN, WRONG = range(3)
-new = tuple.__new__  # a NamedTuple of as many values as it has fields, in a third of the time that its own name takes
+new = tuple.__new__  # makes a NamedTuple of a tuple in a third of the time of its constructor
 
 
 class Frame(NamedTuple):
-    """One frame with a good CRC."""
+    """One frame with a valid CRC."""
 
     message_id: int
     ids: tuple[int, int]
-    """System and component of its sender."""
+    """System id and component id of the sender."""
     sequence: int
     message: Any
-    """A message of `definitions`; None if the id is not among those."""
+    """A message of `definitions`; None if the id is not one of them."""
     raw: bytes
-    """The whole frame as received, if it is signed (not verified) or the parser keeps everything; else b""."""
+    """The whole frame as received if it is signed (not verified) or the parser keeps all frames; else b""."""
     stamp: int = 0
-    """Microseconds since 1970, where frames are stamped (a recorded log)."""
+    """Microseconds since 1970 if frames have stamps (a recorded log); else 0."""
 
     @property
     def payload(self) -> bytes:
-        """As received, where `raw` is kept: MAVLink 2 cuts trailing zeros off."""
+        """The payload as received; empty if `raw` is. MAVLink 2 removes trailing zeros."""
         raw = self.raw
         if not raw:
             return raw
@@ -54,27 +55,27 @@ class Frame(NamedTuple):
 
 
 Values = tuple[int, tuple[int, int], int, Any, bytes, int]
-"""Those of a Frame, in a plain tuple: it is made and taken apart in a third of the time."""
+"""The values of a Frame in a plain tuple, which takes a third of the time to build and unpack."""
 
 
 class Parser:
-    """Finds the frames in the bytes of one link or log; they may be cut anywhere from feed to feed.
+    """Finds the frames in the bytes of one link or log. A feed may end anywhere within a frame.
 
-    `wanted` are the message ids that `feed` returns; frames of other ids are checked and counted, no more. None: every
-    frame is returned with its `raw` bytes, also those of unknown ids, which cannot be checked (to pass them on).
-    If it is `stamped`, each frame has its time before it, as in a recorded log.
+    `wanted` are the message ids that `feed` returns; frames of other ids are only checked and counted. None: `feed`
+    returns every frame with its `raw` bytes, also those of unknown ids, which it cannot check (for forwarding).
+    `stamped`: a time stamp precedes each frame, as in a recorded log.
     """
 
     __slots__ = (
+        "_current",
         "_expected",
         "_format",
-        "_in_step",
+        "_in_sync",
         "_keep_all",
         "_known",
-        "_speaker",
+        "_next_expected",
         "_stamp_size",
         "_tail",
-        "_upcoming",
         "counters",
         "last_stamp",
     )
@@ -83,63 +84,63 @@ class Parser:
         self.counters = Counters()
         self._stamp_size = STAMP_SIZE if stamped else 0
         self.last_stamp = 0
-        """The stamp of the last good frame, wanted or not, where frames are stamped."""
+        """The stamp of the last valid frame, wanted or not, if frames are stamped."""
         self._tail = b""
-        self._in_step = True
-        self._format = FORMATS[V2]  # of the last frame: most streams have only one version, and often one speaker
-        self._speaker = 0  # system and component << 8; nobody is 0.0
-        self._upcoming: int | None = None  # the speaker's next sequence number
-        self._expected: dict[int, int | None] = {}  # that of all who are watched, of others than the speaker
+        self._in_sync = True
+        self._format = FORMATS[V2]  # of the last frame: most streams have only one version, and often one source
+        self._current = 0  # the last source: system | component << 8; 0.0 means none
+        self._next_expected: int | None = None  # the next sequence number of the last source
+        self._expected: dict[int, int | None] = {}  # by source; the entry of the last source may be out of date
         self._keep_all = wanted is None
         self._known = known_ids(frozenset(CRC_EXTRA if wanted is None else wanted))
 
     @property
     def pending(self) -> int:
-        """Bytes kept of a cut frame."""
+        """Bytes kept of an incomplete frame."""
         return len(self._tail)
 
     def reset(self) -> None:
-        """Drop what is left of a cut frame: what comes next does not continue it (a new segment of a log)."""
+        """Drop an incomplete frame: the next bytes do not continue it (a new segment of a log)."""
         self.counters.garbage_bytes += len(self._tail)
         self._tail = b""
-        self._in_step = True
+        self._in_sync = True
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The wanted frames that these bytes complete, in order. Never raises, keeps at most MAX_FRAME bytes."""
+        """The wanted frames that these bytes complete, in order. Never raises; keeps at most MAX_FRAME bytes."""
         found: list[Any] = self.walk(data)
         return [new(Frame, values) for values in found] if found else found
 
     def walk(self, data: bytes) -> list[Values]:
-        """What `feed` gives, as plain tuples.
+        """The frames of `feed` as plain tuples.
 
-        One loop with local names and without a call or an object for a frame that nobody wants: a few hundred
-        nanoseconds a frame is what the whole gateway's speed rests on.
+        One loop with local names. It makes no call and no object for an unwanted frame: the speed of the gateway
+        depends on these few hundred nanoseconds a frame.
         """
         if self._tail:
             data = self._tail + data
         size = len(data)
-        mirrored = data.translate(MIRROR)
+        reversed_data = data.translate(REVERSED)
         version, unpack, header, seed = self._format
         known = self._known[version]
-        speaker, upcoming, expected = self._speaker, self._upcoming, self._expected
-        ids = speaker & 255, speaker >> 8
+        current, next_expected, expected = self._current, self._next_expected, self._expected
+        ids = current & 255, current >> 8
         frames: list[Values] = []
         message: Any
         good = since = old = 0
         stamped = i = self._stamp_size
         trailer, limit = 2 + stamped, size + stamped  # the CRC and the next stamp; where they may end
         before = -1
-        if not self._in_step:
-            i = self._hunt(data, mirrored, min(stamped, size))
-            if not self._in_step:
+        if not self._in_sync:
+            i = self._resync(data, reversed_data, min(stamped, size))
+            if not self._in_sync:
                 self._tail = data[max(0, i - stamped) :]
                 return frames
         try:
             while i < size:
                 if data[i] != version:
                     if data[i] not in FORMATS:
-                        i = self._hunt(data, mirrored, i)
-                        if self._in_step:
+                        i = self._resync(data, reversed_data, i)
+                        if self._in_sync:
                             continue
                         break
                     if version == V1:
@@ -158,27 +159,27 @@ class Parser:
                     effect, reads = known[wire_id]
                 except KeyError:
                     effect, reads = UNKNOWN
-                if crc_hqx(mirrored[i:end], seed) ^ effect != BACK[mirrored[end + 1]] ^ mirrored[end]:
-                    if speaker in expected:
-                        expected[speaker] = upcoming
-                    doubtful = i
-                    i = self._doubt(data, mirrored, i, following)
-                    upcoming = expected.get(speaker)
-                    if self._in_step and i > doubtful:
+                if crc_hqx(reversed_data[i:end], seed) ^ effect != UNDO[reversed_data[end + 1]] ^ reversed_data[end]:
+                    if current in expected:
+                        expected[current] = next_expected
+                    unverified = i
+                    i = self._skip_unverified(data, reversed_data, i, following)
+                    next_expected = expected.get(current)
+                    if self._in_sync and i > unverified:
                         if self._keep_all and effect < 0 and i == following:
-                            frames.append(_unchecked(data, doubtful, following - stamped))
+                            frames.append(_unchecked(data, unverified, following - stamped))
                         continue
                     break
                 before = i
                 i = following
-                if source != speaker:
-                    if speaker in expected:
-                        expected[speaker] = upcoming
-                    upcoming = expected.get(source)
-                    if upcoming is None and len(expected) < MAX_SOURCES:
+                if source != current:
+                    if current in expected:
+                        expected[current] = next_expected
+                    next_expected = expected.get(source)
+                    if next_expected is None and len(expected) < MAX_SOURCES:
                         expected[source] = None
-                    speaker, ids = source, (source & 255, source >> 8)
-                upcoming = NEXT[sequence] if sequence == upcoming else self._gap(upcoming, sequence)
+                    current, ids = source, (source & 255, source >> 8)
+                next_expected = NEXT[sequence] if sequence == next_expected else self._gap(next_expected, sequence)
                 if flags:
                     if flags != SIGNED:
                         self.counters.incompatible += 1
@@ -200,7 +201,7 @@ class Parser:
                     frames.append((message_id, ids, sequence, message, raw, stamp))
         except struct.error:
             pass  # the data ends within a header
-        self._speaker, self._upcoming = speaker, upcoming
+        self._current, self._next_expected = current, next_expected
         self._tail = data[i - stamped :]
         if stamped and before >= 0:
             (self.last_stamp,) = STAMP(data, before - stamped)
@@ -209,9 +210,9 @@ class Parser:
         return frames
 
     def _gap(self, expected: int | None, sequence: int) -> int:
-        """Count the frames missing before this one; the first frame of a source only starts its count.
+        """Count the frames lost before this one; the first frame of a source only starts the count.
 
-        Gives the sequence number of the next one.
+        Returns the sequence number of the next frame.
         """
         if expected is not None:
             gap = (sequence - expected) & 255
@@ -220,19 +221,19 @@ class Parser:
             self.counters.lost += gap
         return NEXT[sequence]
 
-    def _doubt(self, data: bytes, mirrored: bytes, i: int, following: int) -> int:
-        """Where to go on from a whole frame whose CRC is bad or cannot be checked; `i` itself: wait for more data.
+    def _skip_unverified(self, data: bytes, reversed_data: bytes, i: int, following: int) -> int:
+        """The position after a whole frame whose CRC is wrong or cannot be checked; `i`: wait for more data.
 
-        `following` is where the next frame starts if its length is right.
-        The length in a bad frame may be wrong, so a good frame inside it wins. Else both kinds are skipped whole if
-        a frame can start behind them; if they end the data while something inside may yet become a frame, more is
-        awaited. Else the step is lost.
+        `following` is the start of the next frame if the length in the header is right. The length in a damaged frame
+        may be wrong, so a valid frame inside it takes precedence. Otherwise the frame is skipped if another frame can
+        start behind it. If the data ends with the frame, and a part of it may still become a frame, the parser waits
+        for more data. Otherwise the parser is out of sync.
         """
         _, _, sequence, source, wire_id = FORMATS[data[i]].unpack(data, i)
         message_id = wire_id if isinstance(wire_id, int) else int.from_bytes(wire_id, "little")
         bad = message_id in CRC_EXTRA
         at_end = following >= len(data)
-        inside, open_inside = self._find(data, mirrored, i + 1, following) if bad or at_end else (-1, -1)
+        inside, open_inside = self._find(data, reversed_data, i + 1, following) if bad or at_end else (-1, -1)
         if bad and inside >= 0:
             count(self.counters.bad_crc, message_id)
             self.counters.garbage_bytes += inside - i
@@ -241,28 +242,28 @@ class Parser:
             return i
         if at_end or data[following] in (V1, V2):
             count(self.counters.bad_crc if bad else self.counters.unknown, message_id)
-            # its header may be wrong: believed only if it fits, for it must not add to the lost frames
+            # its header may be damaged: the sequence number counts only if it is the expected one
             if self._expected.get(source) == sequence:
                 self._expected[source] = NEXT[sequence]
             return following
         if bad:
             count(self.counters.bad_crc, message_id)
-        return self._hunt(data, mirrored, i)
+        return self._resync(data, reversed_data, i)
 
-    def _hunt(self, data: bytes, mirrored: bytes, i: int) -> int:
-        """Where the next good frame starts, in step again; else from where on the data may become one, out of step."""
-        found, open_ = self._find(data, mirrored, i, len(data))
-        self._in_step = found >= 0
+    def _resync(self, data: bytes, reversed_data: bytes, i: int) -> int:
+        """The start of the next valid frame, in sync again; else the first position at which a frame may start."""
+        found, open_ = self._find(data, reversed_data, i, len(data))
+        self._in_sync = found >= 0
         stop = found if found >= 0 else open_ if open_ >= 0 else len(data)
         self.counters.garbage_bytes += stop - i
         return stop
 
-    def _find(self, data: bytes, mirrored: bytes, start: int, stop: int) -> tuple[int, int]:
-        """The first start of a good frame in a range, and before it the first that more data may make one; -1: none."""
+    def _find(self, data: bytes, reversed_data: bytes, start: int, stop: int) -> tuple[int, int]:
+        """The first start of a valid frame in a range, and before it the first start of an incomplete one; -1: none."""
         open_ = -1
         while match := MAGIC.search(data, start, stop):
             at = match.start()
-            verdict = self._judge(data, mirrored, at)
+            verdict = self._check(data, reversed_data, at)
             if verdict == VALID:
                 return at, open_
             if verdict == OPEN and open_ < 0:
@@ -270,8 +271,8 @@ class Parser:
             start = at + 1
         return -1, open_
 
-    def _judge(self, data: bytes, mirrored: bytes, i: int) -> int:
-        """VALID: a whole frame of a known id with a good CRC. OPEN: the data ends before that is certain."""
+    def _check(self, data: bytes, reversed_data: bytes, i: int) -> int:
+        """VALID: a whole frame of a known id with a valid CRC. OPEN: the data ends too early to decide."""
         size = len(data)
         version, unpack, header, seed = FORMATS[data[i]]
         if i + header > size:
@@ -284,12 +285,12 @@ class Parser:
         end = i + header + length
         if end + (15 if flags and flags & SIGNED else 2) > size:
             return OPEN
-        crc = crc_hqx(mirrored[i:end], seed) ^ effect
-        return VALID if crc == BACK[mirrored[end + 1]] ^ mirrored[end] else WRONG
+        crc = crc_hqx(reversed_data[i:end], seed) ^ effect
+        return VALID if crc == UNDO[reversed_data[end + 1]] ^ reversed_data[end] else WRONG
 
 
 def _unchecked(data: bytes, i: int, following: int) -> Frame:
-    """A frame of an unknown id, as its header says it is."""
+    """A frame of an unknown id, with the values of its header."""
     raw = data[i:following]
     if raw[0] == V2:
         return Frame(int.from_bytes(raw[7:10], "little"), (raw[5], raw[6]), raw[4], None, raw)

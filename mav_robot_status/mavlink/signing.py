@@ -1,10 +1,10 @@
-"""Signatures of MAVLink 2: ours made, those of others verified. No clock, no file: bytes and times in, values out.
+"""MAVLink 2 signatures: sign our frames, verify received ones. No clock and no file: bytes and times in, values out.
 
-The rules are those of https://mavlink.io/en/guide/message_signing.html. All who hold the key share one notion of time:
-a verified stamp that is later than ours moves ours on, however far, and it never goes back. So a key holder with
-a wrong clock takes all others along; at the end of the 48 bits (the year 2104) only a new key helps.
+The rules are those of https://mavlink.io/en/guide/message_signing.html. All holders of a key share one time stamp: a
+verified stamp later than ours advances ours, however far, and ours never goes back. So a key holder with a wrong clock
+advances all others. At the end of the 48 bits (the year 2104) only a new key helps.
 
-Nothing is believed of a frame before its signature is verified: a forged one moves no time and stands in no one's way.
+A frame has no effect before its signature is verified: a forged frame neither advances the time nor creates a stream.
 """
 
 from __future__ import annotations
@@ -17,45 +17,45 @@ from typing import TYPE_CHECKING, Final
 
 from .definitions import CRC_EXTRA
 from .encode import with_crc
-from .wire import MIRROR, SIGNED, V1, V2
+from .wire import REVERSED, SIGNED, V1, V2
 
 if TYPE_CHECKING:
     from .framing import Frame
 
 KEY_SIZE: Final = 32
 UNITS_PER_SECOND: Final = 100_000
-"""A stamp counts 10 us."""
+"""The unit of a stamp is 10 us."""
 EPOCH_US: Final = 1_420_070_400_000_000
-"""Stamps count from 2015-01-01T00:00:00Z: this, in microseconds since 1970."""
+"""The epoch of the stamps, 2015-01-01T00:00:00Z, in microseconds since 1970."""
 MAX_STAMP: Final = 2**48 - 1
-MOST_BEHIND: Final = 60 * UNITS_PER_SECOND
-"""A new stream may be so far behind our own time stamp."""
+MAX_BEHIND: Final = 60 * UNITS_PER_SECOND
+"""How far the first stamp of a stream may be behind ours."""
 MAX_STREAMS: Final = 1024
-"""So many streams are known. Only key holders can make one; further ones are refused, as by MAVLink's C library."""
+"""The most streams. Only a key holder can create one. Further ones are refused, as by MAVLink's C library."""
 SHORTEST: Final = 25
 """Bytes of a signed frame without payload: header 10, CRC 2, signature block 13."""
 
-RADIO: Final = frozenset({109, 166})  # RADIO_STATUS, RADIO: of a telemetry radio, which has no key
+RADIO: Final = frozenset({109, 166})  # RADIO_STATUS, RADIO: sent by a telemetry radio, which has no key
 UNSIGNED_IDS: Final[Mapping[str, Container[int]]] = {"none": (), "radio_status": RADIO, "all": range(1 << 24)}
-"""By the words of the configuration: the message ids that are accepted without a signature."""
+"""The message ids that are accepted without a signature, by the value of the configuration option."""
 
 
 class Verdict(IntEnum):
-    """What a `Verifier` finds."""
+    """The result of a `Verifier`."""
 
     VERIFIED = 0
     LET_THROUGH = 1
-    """Unsigned, as it may be."""
+    """Unsigned, and its message id is allowed without a signature."""
     UNSIGNED = 2
     FORGED = 3
-    """Or damaged, or signed with another key: that cannot be told apart."""
+    """Forged, damaged, or signed with another key: these cannot be distinguished."""
     REPLAYED = 4
-    """Or overtaken by a later frame of its stream, or come twice over two ways."""
+    """Replayed, overtaken by a later frame of its stream, or received on two links."""
     STALE = 5
-    """With a good signature, but the first of its stream and more than a minute behind our own time stamp. An autopilot
-    without the time of day is, until it hears a signed frame of ours."""
-    CROWDED = 6
-    """With a good signature, but of one stream more than are kept."""
+    """A valid signature, but the frame is the first of its stream and more than a minute behind our stamp. This happens
+    with an autopilot that does not know the time, until it receives a signed frame of ours."""
+    TOO_MANY_STREAMS = 6
+    """A valid signature, but MAX_STREAMS streams exist already."""
 
 
 ACCEPTED: Final = frozenset({Verdict.VERIFIED, Verdict.LET_THROUGH})
@@ -66,41 +66,43 @@ WORDS: Final[Mapping[Verdict, str]] = {
     Verdict.FORGED: "forged or signed with another key",
     Verdict.REPLAYED: "replayed or late",
     Verdict.STALE: "first and more than a minute behind our time",
-    Verdict.CROWDED: f"beyond {MAX_STREAMS} streams",
+    Verdict.TOO_MANY_STREAMS: f"beyond {MAX_STREAMS} streams",
 }
-"""For the log: `12 verified, 3 refused unsigned`."""
+"""Texts for the log: `12 verified, 3 refused unsigned`."""
 
 
 def stamp_at(unix_us: int) -> int:
-    """The time stamp of a moment, from 0 to MAX_STAMP."""
+    """The stamp of a time, from 0 to MAX_STAMP."""
     return min(max((unix_us - EPOCH_US) // 10, 0), MAX_STAMP)
 
 
 def is_signed(frame: Frame) -> bool:
-    """Whether a frame carries a signature, good or bad. MAVLink 1 has none."""
+    """Whether a frame has a signature, valid or not. MAVLink 1 has none."""
     return len(frame.raw) >= SHORTEST and frame.raw[0] != V1 and frame.raw[2] & SIGNED != 0
 
 
 class Signer:
-    """The key, and our time stamp: every frame of ours has one of its own, whatever the clock does."""
+    """The key and our time stamp. The stamps of the frames that we sign always rise, whatever the clock does."""
 
     __slots__ = ("_key", "link_id", "stamp")
 
     def __init__(self, key: bytes, link_id: int, stamp: int = 0) -> None:
-        """`stamp` is the last one ever used with this key. ValueError if the key is not KEY_SIZE bytes."""
+        """`stamp` is the last one that was used with this key. Raises ValueError if the key is not KEY_SIZE bytes."""
         if len(key) != KEY_SIZE:
             raise ValueError(f"a signing key has {KEY_SIZE} bytes, not {len(key)}")
         self._key = key
         self.link_id = link_id
-        """Of our first link."""
+        """The link id of our first link."""
         self.stamp = stamp
-        """The last one used or heard. To be kept for the next start."""
+        """The last stamp that was sent or received. The caller stores it for the next start."""
 
     def sign(self, frame: bytes, unix_us: int, link: int = 0) -> bytes:
-        """An unsigned MAVLink 2 frame with a signature. ValueError for anything else, and for an unknown message id.
+        """The unsigned MAVLink 2 frame `frame` with a signature.
 
-        `link` is 0 for our first link, 1 for the next: the link ids count on from `link_id`. Who hears us over two
-        links would take what comes over the slower one for a replay if they had the same.
+        `link` is 0 for our first link, 1 for the next; the link ids count from `link_id`. If two links had the same id,
+        a receiver on both would treat the frames of the slower one as replayed.
+
+        Raises ValueError if the frame is not an unsigned MAVLink 2 frame, and for an unknown message id.
         """
         if len(frame) < 12 or frame[0] != V2 or frame[2] or len(frame) != 12 + frame[1]:
             raise ValueError("only an unsigned MAVLink 2 frame can be signed")
@@ -109,17 +111,17 @@ class Signer:
             raise ValueError("a frame whose CRC_EXTRA is not known cannot be signed: its CRC changes")
         self.stamp = min(max(stamp_at(unix_us), self.stamp + 1), MAX_STAMP)
         flagged = frame[:2] + bytes((SIGNED,)) + frame[3:-2]
-        covered = with_crc(flagged, MIRROR[crc_extra : crc_extra + 1])
+        covered = with_crc(flagged, REVERSED[crc_extra : crc_extra + 1])
         covered += bytes((self.link_id + link & 255,)) + self.stamp.to_bytes(6, "little")
         return covered + self.signature(covered)
 
     def signature(self, covered: bytes) -> bytes:
-        """The six bytes that end a frame of which this is the rest."""
+        """The signature, six bytes, of a frame whose other bytes are `covered`."""
         return sha256(self._key + covered).digest()[:6]
 
 
 class Verifier:
-    """Decides which frames to believe. One serves all links, so that what came on one is not replayed on another."""
+    """Decides which frames to accept. One verifier serves all links, so a frame cannot be replayed on another."""
 
     __slots__ = ("_signer", "_streams", "_unsigned", "counters")
 
@@ -129,14 +131,14 @@ class Verifier:
         self._unsigned = UNSIGNED_IDS[accept_unsigned]
         self._streams: dict[bytes, int] = {}  # system, component, link id -> the last stamp
         self.counters: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
-        """Frames, by what was found."""
+        """The number of frames for each verdict."""
 
     def accepts(self, frame: Frame, unix_us: int) -> bool:
-        """Whether to believe a frame that came at this time; counted. Never raises."""
+        """Whether to accept a frame received at this time, which is counted. Never raises."""
         return self.judge(frame, unix_us) in ACCEPTED
 
     def judge(self, frame: Frame, unix_us: int) -> Verdict:
-        """The same, with what was found."""
+        """The same with the reason."""
         verdict = self._verify(frame.raw, unix_us) if is_signed(frame) else self._unsigned_verdict(frame.message_id)
         self.counters[verdict] += 1
         return verdict
@@ -152,10 +154,10 @@ class Verifier:
         stamp = int.from_bytes(raw[-12:-6], "little")
         last = self._streams.get(stream)
         if last is None:
-            if stamp + MOST_BEHIND < max(signer.stamp, stamp_at(unix_us)):
+            if stamp + MAX_BEHIND < max(signer.stamp, stamp_at(unix_us)):
                 return Verdict.STALE
             if len(self._streams) >= MAX_STREAMS:
-                return Verdict.CROWDED
+                return Verdict.TOO_MANY_STREAMS
         elif stamp <= last:
             return Verdict.REPLAYED
         self._streams[stream] = stamp

@@ -25,5 +25,5 @@ TARGETS: Final[dict[int, tuple[int, int]]] = {
     60012: (32, 33), 60013: (20, 21), 60014: (4, 5), 60045: (2, 3), 60046: (8, 9),
 }
 # fmt: on
-"""By message id: the offsets of target_system and of target_component (-1: there is none) in the payload. Messages that
-are not here name no target. MANUAL_CONTROL's `target` is one, as in MAVLink's C library."""
+"""By message id: the offsets of target_system and of target_component (-1: no such field) in the payload. Other
+messages have no target. MANUAL_CONTROL's `target` counts as target_system, as in MAVLink's C library."""

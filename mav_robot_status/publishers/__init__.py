@@ -1,1 +1,1 @@
-"""Where statuses go: one module each, registered as entry points `mav_robot_status.publishers`."""
+"""Publishers, one module each. The entry points `mav_robot_status.publishers` register them."""

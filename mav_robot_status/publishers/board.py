@@ -1,16 +1,19 @@
-"""The board: the latest status of every handle, as plain values, and what has changed of late. For views to look at.
+"""The board: the latest status of every handle as plain values, and its recent changes. Views read it.
 
-Entries are the members of a native JSON line, so that a view shows the statuses of its own gateway and those that
-came over a network in the same way. Bounded in handles, transitions and time.
+An entry has the members of a native JSON line, so that a view shows local statuses and statuses from a network alike.
+The numbers of handles and transitions and their age are bounded.
 """
 
 from __future__ import annotations
 
 import json
+import threading
 from collections import deque
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..clock import rfc3339
+from ..interface import STATES
+from ..interface.options import Options
 from .json_lines import native_body
 
 if TYPE_CHECKING:
@@ -22,53 +25,52 @@ if TYPE_CHECKING:
 MOST_HANDLES: Final = 4096
 MOST_TRANSITIONS: Final = 500
 KEPT: Final = 600.0
-"""Seconds for which transitions are kept: what the bands of a view show."""
-FIELDS: Final = ("mode", "e_stopped", "drives_powered", "motion_possible", "in_motion", "in_error")
+"""Seconds for which transitions are kept: the time span of a view."""
 
 
 class Transition(NamedTuple):
-    """One member of one handle's status became another value."""
+    """A change of one member of one handle's status."""
 
     at: float
-    """Monotonic seconds of the board's own clock."""
+    """Monotonic seconds of the board's clock."""
     stamp: str
-    """The status's own time, RFC 3339."""
+    """The time of the status, RFC 3339."""
     name: str
     """A field, `flight_mode`, `link`, `error` or `inhibit`."""
     value: Any
     """The new value; of an error or inhibit its name, text and whether it begins."""
     before: Any = None
-    """The value that it had; None also for UNKNOWN, for the first value, and of an error or inhibit."""
+    """The previous value. None for UNKNOWN, before the first value, and for an error or inhibit."""
 
 
 class Entry:
-    """The latest of one handle."""
+    """The latest status of one handle."""
 
     __slots__ = ("at", "began", "heartbeat_age", "line", "lines", "stamp", "transitions", "version")
 
     def __init__(self, now: float) -> None:
         self.began = now
-        """When (monotonic seconds) the first line came."""
+        """When (monotonic seconds) the first line arrived."""
         self.lines = 0
-        """How many lines came."""
+        """The number of lines so far."""
         self.line: Mapping[str, Any] = {}
-        """The members of its latest native line that changed anything; `stamp` and `heartbeat_age` are beside it."""
+        """The members of its last native line with a change. `stamp` and `heartbeat_age` are kept separately."""
         self.stamp = ""
         self.heartbeat_age: float | None = None
         self.at = 0.0
-        """When (monotonic seconds) the latest line came."""
+        """When (monotonic seconds) the latest line arrived."""
         self.version = 0
-        """That of the board when its latest line changed something."""
+        """The version of the board at the last change of this entry."""
         self.transitions: deque[Transition] = deque(maxlen=MOST_TRANSITIONS)
 
     def whole(self) -> dict[str, Any]:
-        """The whole line, as `--format native` writes it; `seq` counts the lines that came."""
+        """The whole line, as `--format native` writes it. `seq` counts the lines so far."""
         link = {**self.line.get("link", {}), "heartbeat_age": self.heartbeat_age}
         return {"stamp": self.stamp, "seq": self.lines - 1, **self.line, "link": link}
 
 
 class Board:
-    """All entries by handle. Of one thread: another is handed what is to go on the board."""
+    """All entries by handle. Only one thread may use it."""
 
     def __init__(self) -> None:
         self.entries: dict[str, Entry] = {}
@@ -82,8 +84,8 @@ class Board:
         """The entries by system, component and handle; those without ids last."""
         return iter(sorted(self.entries.values(), key=_order))
 
-    def take(self, msg: RobotStatusMsg, now: float) -> None:
-        """The newest status of a handle of this process."""
+    def update(self, msg: RobotStatusMsg, now: float) -> None:
+        """Update the board with a status of this process."""
         entry = self._entry(msg.handle, now)
         if entry is None:
             return
@@ -95,8 +97,8 @@ class Board:
         entry.stamp, entry.at = stamp, now
         entry.heartbeat_age = None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
 
-    def take_line(self, handle: str, line: Mapping[str, Any], now: float) -> None:
-        """The newest line of a handle of another process, parsed; whatever it holds, `handle` is its name here."""
+    def update_line(self, handle: str, line: Mapping[str, Any], now: float) -> None:
+        """Update the board with a parsed line of another process. `handle` replaces the handle in the line."""
         entry = self._entry(handle, now)
         if entry is None:
             return
@@ -132,12 +134,17 @@ class Board:
 
 
 class BoardPublisher:
-    """Puts statuses on a board of its own, for a view in the same process. It has no options."""
+    """Puts statuses on its board, for a view in the same process."""
 
     periodic = True
+    options_type = Options
 
     def __init__(self, context: PublisherContext) -> None:
+        """Raises UsageError for an option: there are none."""
+        Options.read("board", context.options)
         self.board = Board()
+        self.lock = threading.Lock()
+        """The lock of the board. Another thread must hold it to read the board."""
         self._waiting: list[RobotStatusMsg] = []
 
     def busy(self) -> bool:
@@ -145,17 +152,19 @@ class BoardPublisher:
         return False
 
     def publish(self, msg: RobotStatusMsg) -> None:
-        """Hold it until `service`, which is called after every round of updates."""
+        """Hold the message until `service`, which follows every round of updates."""
         self._waiting.append(msg)
 
     def service(self, now: Instant) -> None:
-        """Put what was published on the board."""
-        for msg in self._waiting:
-            self.board.take(msg, now.mono)
-        self._waiting.clear()
+        """Put the held messages on the board."""
+        if self._waiting:
+            with self.lock:
+                for msg in self._waiting:
+                    self.board.update(msg, now.mono)
+            self._waiting.clear()
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to release."""
 
 
 def _order(entry: Entry) -> tuple[bool, int, int, str]:
@@ -166,7 +175,7 @@ def _order(entry: Entry) -> tuple[bool, int, int, str]:
 
 
 def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tuple[str, Any, Any]]:
-    for name in FIELDS:
+    for name in (field.name for field in STATES):
         if before.get(name, before) != after.get(name):
             yield name, after.get(name), before.get(name)
     for group, name in (("vehicle", "flight_mode"), ("link", "state")):

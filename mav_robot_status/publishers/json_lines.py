@@ -6,12 +6,14 @@ import json
 import math
 import os
 import select
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from ..clock import rfc3339
-from ..errors import LinkError, UsageError
-from ..interface import RobotMode
+from ..errors import LinkError
+from ..interface import FIELDS, Kind, RobotMode, TriState
+from ..interface.options import Option, Options
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -23,24 +25,26 @@ PIPE_BUF: Final = 4096
 """Bytes that a pipe which poll() calls writable takes without blocking (PIPE_BUF of Linux)."""
 CHUNK: Final = 1 << 16  # bytes written at once on replay
 RETRY: Final = 0.005  # s until a full pipe is tried again
-LOOK: Final = 1.0  # s between looks whether the reader is still there, while there is nothing to write
-WORDS: Final = {-1: "null", 0: "false", 1: "true"}
-MODES: Final = {int(mode): mode.name for mode in RobotMode}
+LOOK: Final = 1.0  # s between two checks of an idle reader
+WORDS: Final[dict[Kind, Mapping[int, str]]] = {
+    Kind.MODE: {mode: f'"{mode.name}"' for mode in RobotMode},
+    Kind.TRI_STATE: {TriState.UNKNOWN: "null", TriState.FALSE: "false", TriState.TRUE: "true"},
+}
+"""The JSON of each value, by the kind of its field. A code is its own number."""
+MEMBERS: Final = tuple((f'"{field.name}": ', WORDS.get(field.kind)) for field in FIELDS)
+"""The name of each field, and the JSON of its values."""
 
 
 def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
-    """The part of a native line that stays while the status does: all but stamp, seq and heartbeat_age.
+    """A native line without stamp, seq and heartbeat_age: the part that changes only with the status.
 
-    It is open behind link.state. What the encoder of `json` takes its time for is asked of it where there is something
-    new only: a line that says that something has changed is one that somebody waits for.
+    The text ends after link.state, so that `native` can append heartbeat_age. The encoder of `json` is slow. It runs
+    for new parts only, which keeps the delay of a changed line short.
     """
     errors = [{"code": e.code, "name": e.name, "text": e.text, "since": rfc3339(e.since_us)} for e in detail.errors]
     inhibits = [{"name": i.name, "text": i.text, "since": rfc3339(i.since_us)} for i in detail.inhibits]
     return (
-        f'{_who(handle, detail.system, detail.component)}, "mode": "{MODES[status.mode]}", '
-        f'"e_stopped": {WORDS[status.e_stopped]}, "drives_powered": {WORDS[status.drives_powered]}, '
-        f'"motion_possible": {WORDS[status.motion_possible]}, "in_motion": {WORDS[status.in_motion]}, '
-        f'"in_error": {WORDS[status.in_error]}, "error_code": {status.error_code}, '
+        f"{_who(handle, detail.system, detail.component)}, {_fields(status)}, "
         f'"errors": {json.dumps(errors) if errors else "[]"}, '
         f'"inhibits": {json.dumps(inhibits) if inhibits else "[]"}, '
         f'"vehicle": {_vehicle(detail.vehicle)}, "link": {{"state": "{detail.link.value}"'
@@ -50,6 +54,14 @@ def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
 @lru_cache(maxsize=256)
 def _who(handle: str, system: int | None, component: int | None) -> str:
     return json.dumps({"handle": handle, "system": system, "component": component})[1:-1]
+
+
+@lru_cache(maxsize=256)
+def _fields(status: RobotStatus) -> str:
+    return ", ".join(
+        name + (str(value) if words is None else words[value])
+        for (name, words), value in zip(MEMBERS, status, strict=True)
+    )
 
 
 @lru_cache(maxsize=256)
@@ -67,7 +79,7 @@ def ros1(msg: RobotStatusMsg, seq: int) -> str:
     """industrial_msgs/RobotStatus of ROS 1; frame_id is the handle's name."""
     seconds, us = divmod(msg.unix_us, 1_000_000)
     header = {"seq": seq, "stamp": {"secs": seconds, "nsecs": us * 1000}, "frame_id": msg.handle}
-    return json.dumps({"header": header, **_vals(msg.status), "error_code": msg.status.error_code}) + "\n"
+    return json.dumps({"header": header, **_ros_fields(msg.status, "ros1")}) + "\n"
 
 
 def ros2(msg: RobotStatusMsg, seq: int) -> str:
@@ -75,42 +87,47 @@ def ros2(msg: RobotStatusMsg, seq: int) -> str:
     seconds, us = divmod(msg.unix_us, 1_000_000)
     header = {"stamp": {"sec": seconds, "nanosec": us * 1000}, "frame_id": msg.handle}
     codes = [e.code for e in msg.detail.errors] or ([msg.status.error_code] if msg.status.error_code else [])
-    return json.dumps({"header": header, **_vals(msg.status), "error_codes": codes}) + "\n"
+    return json.dumps({"header": header, **_ros_fields(msg.status, "ros2", codes)}) + "\n"
 
 
-def _vals(status: RobotStatus) -> dict[str, dict[str, int]]:
-    return {name: {"val": int(value)} for name, value in status._asdict().items() if name != "error_code"}
+def _ros_fields(
+    status: RobotStatus, wire: Literal["ros1", "ros2"], codes: list[int] | None = None
+) -> dict[str, object]:
+    """The fields of industrial_msgs, by its names. `codes` replaces the error code where the message has a list."""
+    named = ((getattr(field.row, wire), field.kind, value) for field, value in zip(FIELDS, status, strict=True))
+    return {
+        name: {"val": int(value)} if kind is not Kind.CODE else value if codes is None else codes
+        for name, kind, value in named
+        if name is not None
+    }
 
 
 ROS_FORMATS: Final[dict[str, Callable[[RobotStatusMsg, int], str]]] = {"ros1": ros1, "ros2": ros2}
 FORMATS: Final = ("native", *ROS_FORMATS)
 
 
-class JsonLinesPublisher:
-    """Writes lines to a file, or to standard output. A reader that is too slow loses lines, never the gateway time.
+@dataclass(frozen=True)
+class JsonOptions(Options):
+    """The options of the publisher `json`."""
 
-    Options: `path` (a file to append to; `-`, the default, is standard output), `format` (native, ros1, ros2),
-    `changes_only` (no periodic lines). Raises BrokenPipeError once the reader has gone, LinkError if nothing can be
-    written for another reason (a full disk).
+    path: Annotated[str, Option("file to append the JSON lines to (-: standard output)", "--json", "FILE|-|none")] = "-"
+    format: Annotated[str, Option("form of the JSON lines (native)", "--format", choices=FORMATS)] = "native"
+    changes_only: Annotated[bool, Option("JSON lines only on change", "--changes-only")] = False
+
+
+class JsonLinesPublisher:
+    """Writes lines to a file or to standard output. A slow reader loses lines; it never blocks the gateway.
+
+    Raises BrokenPipeError after the reader has closed its end, LinkError for every other failure (a full disk).
     """
 
-    @staticmethod
-    def check_options(options: Mapping[str, object]) -> None:
-        """Raises UsageError for an option that there is not, or that cannot be so."""
-        unknown = sorted(set(options) - {"path", "format", "changes_only"})
-        if unknown:
-            raise UsageError(f"json: unknown option '{unknown[0]}'; there are path, format and changes_only")
-        if options.get("format", "native") not in FORMATS:
-            raise UsageError(f"json: format '{options['format']}' is none of {', '.join(FORMATS)}")
-        if not isinstance(options.get("changes_only", False), bool):
-            raise UsageError(f"json: changes_only must be true or false, not '{options['changes_only']}'")
+    options_type = JsonOptions
 
     def __init__(self, context: PublisherContext) -> None:
-        options = context.options
-        self.check_options(options)
-        path = str(options.get("path", "-"))
-        self._format = str(options.get("format", "native"))
-        self.periodic = not options.get("changes_only", False)
+        options = JsonOptions.read("json", context.options)
+        path = options.path
+        self._format = options.format
+        self.periodic = not options.changes_only
         if path == "-":
             self._fd, self._owned = context.stdout.fileno(), False
         else:
@@ -131,12 +148,12 @@ class JsonLinesPublisher:
         self._bodies: dict[str, tuple[RobotStatus, Detail, str]] = {}
 
     def busy(self) -> bool:
-        """True while an earlier line is not wholly written, or the reader has no room for another."""
+        """True while an earlier line is written in part, or the pipe is full."""
         return not self._patient and (bool(self._rest) or not self._writable())
 
     @property
     def queued(self) -> int:
-        """1 while a line is not wholly written."""
+        """1 while a line is written in part."""
         return int(bool(self._rest))
 
     def publish(self, msg: RobotStatusMsg) -> None:
@@ -152,7 +169,7 @@ class JsonLinesPublisher:
             self._write()
 
     def service(self, now: Instant) -> float | None:
-        """Write the rest of a long line; notice that the reader has gone although there is nothing to write."""
+        """Write the rest of a long line. Check whether an idle reader has closed its end."""
         if self._rest:
             self._write()
         elif now.mono >= self._look_at and not self._patient:
@@ -161,7 +178,7 @@ class JsonLinesPublisher:
         return now.mono + RETRY if self._rest else None
 
     def close(self) -> None:
-        """Write the rest of a line if the reader takes it, and close a file of our own."""
+        """Write the rest of a line if the pipe has room, and close the file."""
         try:
             if self._rest:
                 self._write()
@@ -184,11 +201,11 @@ class JsonLinesPublisher:
         if not events:
             return False
         if events[0][1] & (select.POLLERR | select.POLLHUP | select.POLLNVAL):
-            raise BrokenPipeError("the reader of the JSON lines has gone")
+            raise BrokenPipeError("the reader of the JSON lines has closed its end")
         return True
 
     def _collect(self, line: bytes) -> None:
-        """On replay lines are written many at a time."""
+        """Collect a line. A replay writes many lines at once."""
         self._lines.append(line)
         self._waiting += len(line)
         if self._waiting >= CHUNK:
@@ -205,7 +222,7 @@ class JsonLinesPublisher:
                 self._poll.poll()
 
     def _write(self) -> None:
-        """Write while the reader takes it, never more at once than cannot block."""
+        """Write while the pipe has room, at most PIPE_BUF bytes at once, so that no write blocks."""
         while self._rest and self._writable():
             done = self._put(self._rest[:PIPE_BUF])
             self._rest = self._rest[done:]
@@ -213,7 +230,7 @@ class JsonLinesPublisher:
                 return
 
     def _put(self, data: bytes | memoryview) -> int:
-        """The bytes that were written; 0 if there is no room now."""
+        """The number of bytes written; 0 if the pipe is full."""
         try:
             return os.write(self._fd, data)
         except BlockingIOError:

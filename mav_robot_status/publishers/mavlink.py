@@ -1,56 +1,57 @@
-"""Statuses as MAVLink: ROBOT_STATUS (id 59900) to everyone who listens.
+"""Statuses as MAVLink: ROBOT_STATUS (id 59900).
 
-It thins itself, whatever the controller's rate: 1 Hz, and changes at most 5 a second with the last state always sent.
-An audience may ask for another interval than a second, or for none; it never gets more than the controller publishes.
+The rate does not depend on the controller: 1 Hz, and at most 5 changes a second; the last state is always sent. An
+audience may ask for another interval or for none. It never gets more messages than the controller publishes.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from ..interface import FIELDS
 from ..mavlink.commands import PERIODS, ROBOT_STATUS
 from ..mavlink.definitions import RobotStatus as RobotStatusMessage
-from .thinning import Schedule, ThinnedPublisher
+from .rate_limiter import RateLimitedPublisher, Schedule
 
 if TYPE_CHECKING:
     from ..clock import Instant
     from ..interface import Audience, RobotStatusMsg
 
+INHIBITS: Final = (
+    "LINK_STALE DISARMED E_STOPPED SAFETY_SWITCH PREARM_FAILING INITIALISING CALIBRATING POWERING_OFF TERMINATION "
+    "EMERGENCY HIL SYS_STATUS_MISSING MODE_MANUAL"
+).split()
+"""ROBOT_STATUS_INHIBIT of the dialect: the names of the bits of inhibit_flags, from bit 0."""
+FLAGS: Final = {name: 1 << bit for bit, name in enumerate(INHIBITS)}
+CARRIED: Final = tuple((field.name, field.row.mavlink) for field in FIELDS if field.row.mavlink is not None)
+"""The fields in ROBOT_STATUS: our name and the MAVLink name of each."""
+
 
 def message_of(msg: RobotStatusMsg) -> RobotStatusMessage:
-    """ROBOT_STATUS as it goes over the wire; ids that are not known are 0."""
+    """ROBOT_STATUS as it goes over the wire. Unknown ids are 0. An inhibit without a bit is left out."""
     status, detail = msg.status, msg.detail
-    flags = 0
-    for inhibit in detail.inhibits:
-        flags |= 1 << inhibit.bit
     return RobotStatusMessage(
         time_usec=max(0, msg.unix_us),
-        error_code=status.error_code,
-        inhibit_flags=flags,
+        inhibit_flags=sum(FLAGS.get(name, 0) for name in {inhibit.name for inhibit in detail.inhibits}),
         subject_system=detail.system or 0,
         subject_component=detail.component or 0,
-        mode=status.mode,
-        e_stopped=status.e_stopped,
-        drives_powered=status.drives_powered,
-        motion_possible=status.motion_possible,
-        in_motion=status.in_motion,
-        in_error=status.in_error,
+        **{there: getattr(status, here) for here, there in CARRIED},
     )
 
 
-class MavlinkPublisher(ThinnedPublisher[Schedule]):
+class MavlinkPublisher(RateLimitedPublisher[Schedule]):
     """Sends ROBOT_STATUS."""
 
     name = "mavlink"
-    memory = Schedule
+    state_type = Schedule
 
     def wants(self, audience: Audience) -> bool:
-        """True unless the audience wants none."""
+        """True unless the audience asked for no messages."""
         return audience.interval != math.inf
 
     def service(self, now: Instant) -> float | None:
-        """Send what is its turn, and what was asked for once; when a change that is held back will be due."""
+        """Send due messages and answer single requests; return when a delayed change will be due."""
         again = super().service(now)
         requests = self._port.requests()
         if requests:
@@ -60,10 +61,10 @@ class MavlinkPublisher(ThinnedPublisher[Schedule]):
                     self._send_once(audiences[key], system)
         return again
 
-    def tell(self, msg: RobotStatusMsg, system: int, audience: Audience, told: Schedule, now: float) -> float:
-        """Send the status if it is its turn."""
+    def send_due(self, msg: RobotStatusMsg, system: int, audience: Audience, state: Schedule, now: float) -> float:
+        """Send the status if it is due."""
         interval = PERIODS[ROBOT_STATUS] if audience.interval is None else audience.interval
-        due = told.turn(msg, (msg.status, msg.detail), interval, now)
+        due = state.due(msg, (msg.status, msg.detail), interval, now)
         if due > now:
             return due
         self._port.send(message_of(msg), system, audience)

@@ -1,15 +1,16 @@
-"""Metrics in Prometheus' text format 0.0.4. Values in, text out; what is not known has no line.
+"""Metrics in Prometheus' text format 0.0.4. A value that is not known has no line.
 
-Names follow https://prometheus.io/docs/practices/naming/: base units, `_total` for what only grows. Label values are
-names of ours and of the configuration, never an autopilot's own words, which would make series without end.
+Names follow https://prometheus.io/docs/practices/naming/: base units, `_total` for counters. Label values are
+our names and those of the configuration, never an autopilot's texts: these would create series without limit.
 """
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from .. import __version__
-from ..interface import LinkState
+from ..interface import FIELDS, Kind, LinkState
+from ..version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -22,17 +23,18 @@ CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 PREFIX: Final = "mav_robot_status_"
 GAUGE, COUNTER = "gauge", "counter"
 
-TRISTATE: Final = "-1 unknown, 0 false, 1 true."
+NUMBERS: Final = {Kind.MODE: " -1 unknown, 1 manual, 2 auto.", Kind.TRI_STATE: " -1 unknown, 0 false, 1 true."}
+"""What the help of a field adds to its meaning."""
 
 
 class Family(NamedTuple):
-    """One metric: a line for each thing that it is about, or for each of several labels of that thing."""
+    """One metric. Each vehicle, connection or publisher has one line, or one for each set of further labels."""
 
     name: str
     kind: str
     help: str
     read: Callable[[Any], float | Iterable[tuple[Labels, float]] | None]
-    """The value, None if there is none; or several, each with labels of its own."""
+    """One value, None for no value, or several values with further labels."""
 
 
 def _connected(msg: RobotStatusMsg) -> float:
@@ -51,15 +53,12 @@ def _info(msg: RobotStatusMsg) -> Iterable[tuple[Labels, float]]:
 
 
 VEHICLE: Final = (
-    Family("link_up", GAUGE, "1 if heartbeats of the vehicle come, 0 if not.", _connected),
+    Family("link_up", GAUGE, "1 while heartbeats of the vehicle arrive, else 0.", _connected),
     Family("heartbeat_age_seconds", GAUGE, "Seconds since the last heartbeat of the vehicle.", _age),
-    Family("mode", GAUGE, "Who moves the vehicle: -1 unknown, 1 manual, 2 auto.", lambda m: m.status.mode),
-    Family("e_stopped", GAUGE, TRISTATE, lambda m: m.status.e_stopped),
-    Family("drives_powered", GAUGE, TRISTATE, lambda m: m.status.drives_powered),
-    Family("motion_possible", GAUGE, TRISTATE, lambda m: m.status.motion_possible),
-    Family("in_motion", GAUGE, TRISTATE, lambda m: m.status.in_motion),
-    Family("in_error", GAUGE, TRISTATE, lambda m: m.status.in_error),
-    Family("error_code", GAUGE, "The most important active cause, 0 if there is none.", lambda m: m.status.error_code),
+    *(
+        Family(field.name, GAUGE, field.row.meaning + NUMBERS.get(field.kind, ""), attrgetter(f"status.{field.name}"))
+        for field in FIELDS
+    ),
     Family(
         "error",
         GAUGE,
@@ -72,7 +71,7 @@ VEHICLE: Final = (
         "1 for each reason why motion is not possible.",
         lambda m: (({"reason": i.name}, 1) for i in m.detail.inhibits),
     ),
-    Family("vehicle_info", GAUGE, "1, with what the autopilot says of itself.", _info),
+    Family("vehicle_info", GAUGE, "1, with the autopilot's description of itself.", _info),
 )
 CONNECTION: Final = (
     Family("connection_frames_total", COUNTER, "MAVLink frames received that were not damaged.", lambda c: c.frames),
@@ -142,7 +141,7 @@ def _of_publisher(one: PublisherMetrics) -> Labels:
 
 
 def _family(family: Family, things: list[tuple[Labels, Any]]) -> list[str]:
-    """Its lines; none if there is no value. Things of the same labels are added up: a series may stand there once."""
+    """The lines of a metric; none without a value. Values with the same labels are added: a series must be unique."""
     values: dict[str, float] = {}
     for labels, thing in things:
         found = family.read(thing)

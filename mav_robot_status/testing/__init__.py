@@ -1,4 +1,4 @@
-"""A fake autopilot and a manual clock: for the tests of this project and of its users, and for the demo.
+"""A fake autopilot and a manual clock, for our tests, for your tests, and for the demo.
 
     >>> import socket
     >>> from mav_robot_status.testing import FakeAutopilot, ardurover, decode
@@ -9,11 +9,12 @@
     ...         print(decode(gateway.recv(300))[0].get_type())
     HEARTBEAT
 
-Scenarios are data: `scenarios` has those that come along, `step` and `Scenario` make your own. For tests
-that do not wait, call `FakeAutopilot.poll` with the instants of a `ManualClock` instead of using `with`.
+Scenarios are data: `scenarios` has ready ones; build others with `step` and `Scenario`. For tests without waits, call
+`FakeAutopilot.poll` with the instants of a `ManualClock` instead of using `with`.
 """
 
-from .fake_autopilot import FakeAutopilot, decode
+from .codec import decode
+from .fake_autopilot import FakeAutopilot
 from .manual_clock import ManualClock
 from .scenario import Action, Scenario, Step, Text, VehicleState, step
 from .scenarios import (

@@ -1,12 +1,12 @@
-"""What the vehicle answers to the messages that it gets."""
+"""How the vehicle answers received messages."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
-from ..mavlink.pymavlink_dialect import MAVLink_command_ack_message, MAVLink_param_value_message
+from .codec import DecodedMessage
+from .definitions import CommandAck, ParamValue
 from .firmware import (
     ACCEPTED,
     ARDUPILOT,
@@ -30,30 +30,30 @@ GCS = 6
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, ARM_DISARM, DO_SET_MODE, SET_MODE = 511, 512, 400, 176, 11
 AVAILABLE_MODES = 435
 STREAM_GROUPS = {2: (1,), 3: (36,), 6: (33, 32), 10: (30,), 11: (74,), 12: (2,)}
-"""ArduPilot's stream groups: which of our messages REQUEST_DATA_STREAM starts. 0 means all of them."""
+"""ArduPilot's stream groups: the message ids that REQUEST_DATA_STREAM starts. Group 0 means all groups."""
 INT16 = 4
 
 
-def answer(model: VehicleModel, message: Any) -> None:
-    """Take one message that was received; what it causes is sent with the next `VehicleModel.run`."""
-    model.heard = True
-    model.gcs_heard |= message.get_type() == "HEARTBEAT" and message.type == GCS
+def answer(model: VehicleModel, message: DecodedMessage) -> None:
+    """Process one received message. The next `VehicleModel.run` returns the answers."""
+    model.peer_seen = True
+    model.gcs_seen |= message.get_type() == "HEARTBEAT" and message.type == GCS
     if message.get_type() in ANSWERS:
         ANSWERS[message.get_type()](model, message)
 
 
-def _command(model: VehicleModel, m: Any) -> None:
+def _command(model: VehicleModel, m: DecodedMessage) -> None:
     result = COMMANDS[m.command](model, m) if m.command in COMMANDS else UNSUPPORTED
     _acknowledge(model, m, m.command, result)
     if m.command == DO_SET_MODE and model.firmware.autopilot == PX4:
-        _acknowledge(model, m, m.command, result)  # PX4 answers this one twice
+        _acknowledge(model, m, m.command, result)  # PX4 acknowledges this command twice
 
 
-def _acknowledge(model: VehicleModel, m: Any, command: int, result: int) -> None:
-    model.send(MAVLink_command_ack_message(command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent()))
+def _acknowledge(model: VehicleModel, m: DecodedMessage, command: int, result: int) -> None:
+    model.send(CommandAck(command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent()))
 
 
-def _set_message_interval(model: VehicleModel, m: Any) -> int:
+def _set_message_interval(model: VehicleModel, m: DecodedMessage) -> int:
     message_id, microseconds = m.param1, m.param2
     if not can_send(model.firmware, message_id):
         return FAILED
@@ -64,12 +64,12 @@ def _set_message_interval(model: VehicleModel, m: Any) -> int:
         model.request(int(message_id), None)
     elif microseconds > 0:
         model.request(int(message_id), min(max(microseconds / 1e6, 0.001), 60.0))
-    else:  # negative, or no number at all
+    else:  # negative or NaN
         return DENIED
     return ACCEPTED
 
 
-def _request_message(model: VehicleModel, m: Any) -> int:
+def _request_message(model: VehicleModel, m: DecodedMessage) -> int:
     if m.param1 == AVAILABLE_MODES and model.firmware.modes:
         for mode in available_modes(model.firmware, int(m.param2) if math.isfinite(m.param2) else 0):
             model.send(mode)
@@ -80,7 +80,7 @@ def _request_message(model: VehicleModel, m: Any) -> int:
     return ACCEPTED
 
 
-def _arm_disarm(model: VehicleModel, m: Any) -> int:
+def _arm_disarm(model: VehicleModel, m: DecodedMessage) -> int:
     arm, forced, state = m.param1 == 1, m.param2 == FORCED, model.state
     if arm and not_armable(state) and not forced:
         model.say(Text(2, model.firmware.arming_refused.format(not_armable(state))))
@@ -91,20 +91,20 @@ def _arm_disarm(model: VehicleModel, m: Any) -> int:
     return ACCEPTED
 
 
-def _do_set_mode(model: VehicleModel, m: Any) -> int:
+def _do_set_mode(model: VehicleModel, m: DecodedMessage) -> int:
     if not all(map(math.isfinite, (m.param1, m.param2, m.param3))):
         return DENIED
     if model.firmware.autopilot == PX4:
-        return _take_mode(model, int(m.param1), px4_mode(int(m.param2) & 0xFF, int(m.param3) & 0xFF))
-    return _take_mode(model, int(m.param1), int(m.param2))
+        return _change_mode(model, int(m.param1), px4_mode(int(m.param2) & 0xFF, int(m.param3) & 0xFF))
+    return _change_mode(model, int(m.param1), int(m.param2))
 
 
-def _set_mode(model: VehicleModel, m: Any) -> None:
+def _set_mode(model: VehicleModel, m: DecodedMessage) -> None:
     command = SET_MODE if model.firmware.autopilot == ARDUPILOT else DO_SET_MODE
-    _acknowledge(model, m, command, _take_mode(model, m.base_mode, m.custom_mode))
+    _acknowledge(model, m, command, _change_mode(model, m.base_mode, m.custom_mode))
 
 
-def _take_mode(model: VehicleModel, base_mode: int, custom_mode: int) -> int:
+def _change_mode(model: VehicleModel, base_mode: int, custom_mode: int) -> int:
     if not base_mode & CUSTOM_MODE_ENABLED:
         return DENIED
     if custom_mode not in model.firmware.base_modes:
@@ -114,7 +114,7 @@ def _take_mode(model: VehicleModel, base_mode: int, custom_mode: int) -> int:
     return ACCEPTED
 
 
-def _request_data_stream(model: VehicleModel, m: Any) -> None:
+def _request_data_stream(model: VehicleModel, m: DecodedMessage) -> None:
     if model.firmware.autopilot != ARDUPILOT:
         return
     groups = STREAM_GROUPS if m.req_stream_id == 0 else {m.req_stream_id}
@@ -122,22 +122,22 @@ def _request_data_stream(model: VehicleModel, m: Any) -> None:
         model.request(message_id, 1 / m.req_message_rate if m.start_stop == 1 and m.req_message_rate else None)
 
 
-def _param_request_read(model: VehicleModel, m: Any) -> None:
-    """ArduPilot is silent about a parameter that it does not have; so is this."""
+def _param_request_read(model: VehicleModel, m: DecodedMessage) -> None:
+    """Like ArduPilot, this sends nothing for an unknown parameter."""
     names = list(model.firmware.parameters)
     name = m.param_id if m.param_index < 0 else names[m.param_index] if m.param_index < len(names) else ""
     if name in model.firmware.parameters:
         value = float(model.firmware.parameters[name])
-        model.send(MAVLink_param_value_message(name.encode(), value, INT16, len(names), m.param_index & 0xFFFF))
+        model.send(ParamValue(value, len(names), m.param_index & 0xFFFF, name.encode(), INT16))
 
 
-COMMANDS: dict[int, Callable[[VehicleModel, Any], int]] = {
+COMMANDS: dict[int, Callable[[VehicleModel, DecodedMessage], int]] = {
     SET_MESSAGE_INTERVAL: _set_message_interval,
     REQUEST_MESSAGE: _request_message,
     ARM_DISARM: _arm_disarm,
     DO_SET_MODE: _do_set_mode,
 }
-ANSWERS: dict[str, Callable[[VehicleModel, Any], None]] = {
+ANSWERS: dict[str, Callable[[VehicleModel, DecodedMessage], None]] = {
     "COMMAND_LONG": _command,
     "COMMAND_INT": _command,
     "SET_MODE": _set_mode,

@@ -1,4 +1,4 @@
-"""What differs between firmwares, as one row of data, and how a state is said on the wire; see `firmwares`."""
+"""The differences between firmwares as data, and how each reports its state; see `firmwares`."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ class Firmware(NamedTuple):
     outputs: Callable[[VehicleState], tuple[int, ...]]
     """SERVO_OUTPUT_RAW."""
     streams: Mapping[int, float]
-    """Message id to Hz: what flows without being asked for."""
+    """Message id to Hz: the streams that run without a request."""
     refused: int
-    """MAV_RESULT of an arming that the checks do not allow."""
+    """The MAV_RESULT of arming while the pre-arm checks fail."""
     prearm_prefix: str
-    """Before the reason when the checks fail; empty: the firmware does not announce it by itself."""
+    """Precedes the reason when the checks fail; empty: the firmware does not announce the reason."""
     arming_refused: str
-    """The text that goes with it; {} stands for the reason."""
+    """The text that accompanies `refused`; {} becomes the reason."""
     armed_text: str
-    """Empty: it says nothing when it is armed or disarmed."""
+    """Empty: the firmware sends no text when it arms."""
     disarmed_text: str
     parameters: Mapping[str, int]
     vtol_state: int
@@ -56,13 +56,13 @@ class Firmware(NamedTuple):
     ready: VehicleState
     """Disarmed, all checks passed."""
     modes: tuple[Mode, ...] = ()
-    """What it answers to a request for AVAILABLE_MODES; empty: it does not know that message."""
+    """The rows of AVAILABLE_MODES; empty: the firmware does not support that message."""
     on_request: frozenset[int] | None = None
-    """The messages that it can be asked for; None: all that it has."""
+    """The messages that a peer can request; None: all that the firmware sends."""
 
 
 def base_mode(firmware: Firmware, state: VehicleState) -> int:
-    """HEARTBEAT.base_mode; a mode that is not in the table says CUSTOM_MODE only."""
+    """HEARTBEAT.base_mode; CUSTOM_MODE only, for a mode that is not in the table."""
     if state.base_mode is not None:
         return state.base_mode
     return firmware.base_modes.get(state.custom_mode, 1) | (ARMED if state.armed else 0)
@@ -76,14 +76,14 @@ def system_status(firmware: Firmware, state: VehicleState) -> int:
 def sensors(firmware: Firmware, state: VehicleState, prearm_ok: bool) -> tuple[int, int, int]:
     """The masks of SYS_STATUS: present, enabled, health.
 
-    ArduPilot says PREARM_CHECK in all three, healthy also while armed; PX4 only in health; others not at all.
+    ArduPilot sets PREARM_CHECK in all three, and in health also while armed; PX4 only in health; others never.
     """
     present, enabled = state.sensors_present, state.sensors_enabled
     healthy = prearm_ok or (state.armed and firmware.autopilot == ARDUPILOT)
     if state.safety_switch and firmware.autopilot == ARDUPILOT:
         enabled &= ~MOTOR_OUTPUTS
-    told = firmware.autopilot == PX4 or present & PREARM_CHECK
-    return present, enabled, state.sensors_health & ~PREARM_CHECK | (PREARM_CHECK if healthy and told else 0)
+    reported = firmware.autopilot == PX4 or present & PREARM_CHECK
+    return present, enabled, state.sensors_health & ~PREARM_CHECK | (PREARM_CHECK if healthy and reported else 0)
 
 
 def not_armable(state: VehicleState) -> str:

@@ -1,7 +1,7 @@
-"""The firmwares that can be played: ArduPilot Rover and Copter, PX4 on a quadrotor.
+"""The firmwares of the scenarios: ArduPilot Rover and Copter, PX4 on a quadrotor.
 
-Numbers, texts and their order are those of ArduPilot 4.5.6 and PX4 1.17-alpha, seen in simulation with the real
-firmware. Only the boot is shorter: a real estimator takes some 20 s to find its position.
+Numbers, texts and their order are those of ArduPilot 4.5.6 and PX4 1.17-alpha, observed in simulation with the real
+firmware. Only the boot is shorter: a real estimator needs about 20 s to find its position.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ ARDUROVER = Firmware(
     boot=(
         step(0.7, "the inertial sensors are calibrated", (6, "Beginning INS calibration. Do not move vehicle")),
         step(1.34, "booted: MANUAL", (6, "ArduPilot Ready"), (6, "AHRS: DCM active"), custom_mode=0),
-        step(2.0, "SYS_STATUS begins; the pre-arm checks fail, for there is no GPS fix yet", initialised=True),
+        step(2.0, "SYS_STATUS begins; the pre-arm checks fail without a GPS fix", initialised=True),
         step(
             6.0,
             "the position is known: the pre-arm checks pass, the rover can be armed",
@@ -154,7 +154,7 @@ ARDUCOPTER = Firmware(
     ),
     boot=(
         step(1.24, "booted", (6, "ArduPilot Ready"), (6, "AHRS: DCM active")),
-        step(2.0, "SYS_STATUS begins; the pre-arm checks fail, for there is no position yet", initialised=True),
+        step(2.0, "SYS_STATUS begins; the pre-arm checks fail without a position", initialised=True),
         step(
             6.0,
             "the position is known: the pre-arm checks pass, the copter can be armed",
@@ -197,7 +197,7 @@ PX4_QUAD = Firmware(
     boot=(
         step(
             1.0,
-            "the sensors are there; the position is not yet known",
+            "the sensors are present; the position is not known yet",
             sensors_present=_PX4_SENSORS & ~RC_RECEIVER & ~GPS,
             sensors_enabled=_PX4_SENSORS & ~GPS,
             sensors_health=_PX4_SENSORS & ~RC_RECEIVER & ~GPS & ~(1 << 14),

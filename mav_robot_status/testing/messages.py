@@ -1,4 +1,4 @@
-"""From what is the case to MAVLink messages, with pymavlink: on purpose not with the gateway's own encoder."""
+"""Builds MAVLink messages from the state of the vehicle."""
 
 from __future__ import annotations
 
@@ -6,105 +6,127 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..mavlink.pymavlink_dialect import (
-    MAVLink_attitude_message,
-    MAVLink_available_modes_message,
-    MAVLink_current_mode_message,
-    MAVLink_ekf_status_report_message,
-    MAVLink_extended_sys_state_message,
-    MAVLink_global_position_int_message,
-    MAVLink_heartbeat_message,
-    MAVLink_local_position_ned_message,
-    MAVLink_message,
-    MAVLink_servo_output_raw_message,
-    MAVLink_statustext_message,
-    MAVLink_sys_status_message,
-    MAVLink_system_time_message,
-    MAVLink_vfr_hud_message,
+from .definitions import (
+    Attitude,
+    AvailableModes,
+    CurrentMode,
+    EkfStatusReport,
+    ExtendedSysState,
+    GlobalPositionInt,
+    Heartbeat,
+    LocalPositionNed,
+    ServoOutputRaw,
+    Statustext,
+    SysStatus,
+    SystemTime,
+    VfrHud,
 )
 from .firmware import ARDUPILOT, PX4, Firmware, base_mode, sensors, system_status
 from .scenario import Text, VehicleState
 
 HEARTBEAT, SYS_STATUS = 0, 1
 HOME = (-353632610, 1491652300, 584000)
-"""1e-7 degrees and mm. The vehicle is always here, however it moves: a status does not depend on it."""
+"""Latitude and longitude in 1e-7 degrees, altitude in mm. They never change: a status does not depend on them."""
 CHUNK = 50
 NOT_OF_ARDUPILOT, ONLY_OF_ARDUPILOT = {436}, {193}
-ESTIMATED, UNAIDED = 0x33F, 0xA7  # EKF_STATUS_FLAGS: all there is; attitude and height alone, taken to stand
+ESTIMATED, UNAIDED = 0x33F, 0xA7  # EKF_STATUS_FLAGS: all estimates; only attitude and height, in constant position mode
 
 
 class Snapshot(NamedTuple):
-    """All that a message is made of."""
+    """The inputs of a message."""
 
     firmware: Firmware
     state: VehicleState
     prearm_ok: bool
-    """What the last run of the pre-arm checks found."""
+    """The result of the last run of the pre-arm checks."""
     boot_ms: int
     unix_us: int
 
 
-def heartbeat(s: Snapshot) -> MAVLink_message:
+def heartbeat(s: Snapshot) -> NamedTuple:
     """HEARTBEAT."""
     f, state = s.firmware, s.state
-    return MAVLink_heartbeat_message(
-        f.type, f.autopilot, base_mode(f, state), state.custom_mode, system_status(f, state), 3
+    return Heartbeat(
+        custom_mode=state.custom_mode,
+        type=f.type,
+        autopilot=f.autopilot,
+        base_mode=base_mode(f, state),
+        system_status=system_status(f, state),
+        mavlink_version=3,
     )
 
 
-def _sys_status(s: Snapshot) -> MAVLink_message:
+def _sys_status(s: Snapshot) -> NamedTuple:
     present, enabled, health = sensors(s.firmware, s.state, s.prearm_ok)
-    return MAVLink_sys_status_message(
-        present, enabled, health, 0, 12600, 0, 100, 0, 0, s.state.errors_count1, 0, 0, 0
-    )  # fmt: skip
+    return SysStatus(
+        onboard_control_sensors_present=present,
+        onboard_control_sensors_enabled=enabled,
+        onboard_control_sensors_health=health,
+        load=0,
+        voltage_battery=12600,
+        current_battery=0,
+        drop_rate_comm=0,
+        errors_comm=0,
+        errors_count1=s.state.errors_count1,
+        errors_count2=0,
+        errors_count3=0,
+        errors_count4=0,
+        battery_remaining=100,
+        onboard_control_sensors_present_extended=0,
+        onboard_control_sensors_enabled_extended=0,
+        onboard_control_sensors_health_extended=0,
+    )
 
 
-def _system_time(s: Snapshot) -> MAVLink_message:
-    return MAVLink_system_time_message(s.unix_us if s.state.position else 0, s.boot_ms)
+def _system_time(s: Snapshot) -> NamedTuple:
+    return SystemTime(s.unix_us if s.state.position else 0, s.boot_ms)
 
 
-def _attitude(s: Snapshot) -> MAVLink_message:
-    return MAVLink_attitude_message(s.boot_ms, 0.0, 0.0, 0.0, *s.state.rates)
+def _attitude(s: Snapshot) -> NamedTuple:
+    return Attitude(s.boot_ms, 0.0, 0.0, 0.0, *s.state.rates)
 
 
-def _local_position(s: Snapshot) -> MAVLink_message:
-    return MAVLink_local_position_ned_message(s.boot_ms, 0.0, 0.0, 0.0, *s.state.velocity)
+def _local_position(s: Snapshot) -> NamedTuple:
+    return LocalPositionNed(s.boot_ms, 0.0, 0.0, 0.0, *s.state.velocity)
 
 
-def _global_position(s: Snapshot) -> MAVLink_message:
+def _global_position(s: Snapshot) -> NamedTuple:
     lat, lon, alt = HOME if s.state.position else (0, 0, 0)
     vx, vy, vz = (round(v * 100) for v in s.state.velocity)
-    return MAVLink_global_position_int_message(s.boot_ms, lat, lon, alt, 0, vx, vy, vz, 0)
+    return GlobalPositionInt(s.boot_ms, lat, lon, alt, 0, vx, vy, vz, 0)
 
 
-def _servo_outputs(s: Snapshot) -> MAVLink_message:
+def _servo_outputs(s: Snapshot) -> NamedTuple:
     outputs = s.firmware.outputs(s.state) if s.state.servos is None else s.state.servos
-    return MAVLink_servo_output_raw_message(s.boot_ms * 1000 & 0xFFFFFFFF, 0, *(outputs + (0,) * 16)[:16])
+    main, auxiliary = (outputs + (0,) * 8)[:8], (outputs[8:] + (0,) * 8)[:8]
+    return ServoOutputRaw._make((s.boot_ms * 1000 & 0xFFFFFFFF, *main, 0, *auxiliary))
 
 
-def _vfr_hud(s: Snapshot) -> MAVLink_message:
+def _vfr_hud(s: Snapshot) -> NamedTuple:
     north, east, down = s.state.velocity
     speed = math.hypot(north, east)
-    return MAVLink_vfr_hud_message(speed, speed, 0, s.state.throttle, HOME[2] / 1000, -down)
+    return VfrHud(
+        airspeed=speed, groundspeed=speed, alt=HOME[2] / 1000, climb=-down, heading=0, throttle=s.state.throttle
+    )
 
 
-def _extended_sys_state(s: Snapshot) -> MAVLink_message:
+def _extended_sys_state(s: Snapshot) -> NamedTuple:
     vtol_state = s.firmware.vtol_state if s.state.vtol_state is None else s.state.vtol_state
-    return MAVLink_extended_sys_state_message(vtol_state, s.state.landed_state)
+    return ExtendedSysState(vtol_state, s.state.landed_state)
 
 
-def _current_mode(s: Snapshot) -> MAVLink_message:
+def _current_mode(s: Snapshot) -> NamedTuple:
     number = s.state.custom_mode
     standard_mode = next((mode.standard_mode for mode in s.firmware.modes if mode.custom_mode == number), 0)
-    return MAVLink_current_mode_message(standard_mode, number, number)
+    return CurrentMode(custom_mode=number, intended_custom_mode=number, standard_mode=standard_mode)
 
 
-def _ekf_status_report(s: Snapshot) -> MAVLink_message:
+def _ekf_status_report(s: Snapshot) -> NamedTuple:
     flags = ESTIMATED if s.state.position else UNAIDED
-    return MAVLink_ekf_status_report_message(flags, 0.1, 0.1, 0.1, 0.1, 0.0)
+    return EkfStatusReport(0.1, 0.1, 0.1, 0.1, 0.0, flags=flags, airspeed_variance=0.0)
 
 
-BUILDERS: dict[int, Callable[[Snapshot], MAVLink_message]] = {
+BUILDERS: dict[int, Callable[[Snapshot], NamedTuple]] = {
     HEARTBEAT: heartbeat,
     SYS_STATUS: _sys_status,
     2: _system_time,
@@ -120,7 +142,7 @@ BUILDERS: dict[int, Callable[[Snapshot], MAVLink_message]] = {
 
 
 def can_send(firmware: Firmware, message_id: int) -> bool:
-    """True if that firmware has that stream, so that it can be requested."""
+    """Whether this firmware streams that message on request."""
     return (
         message_id in BUILDERS
         and message_id != HEARTBEAT
@@ -129,22 +151,27 @@ def can_send(firmware: Firmware, message_id: int) -> bool:
     )
 
 
-def available_modes(firmware: Firmware, index: int) -> list[MAVLink_message]:
-    """AVAILABLE_MODES: the mode with this index, which counts from 1, or with 0 all of them."""
+def available_modes(firmware: Firmware, index: int) -> list[NamedTuple]:
+    """AVAILABLE_MODES of the mode with this index, which counts from 1; 0: of all modes."""
     return [
-        MAVLink_available_modes_message(
-            len(firmware.modes), i, mode.standard_mode, mode.custom_mode, mode.properties, mode.name.encode()
+        AvailableModes(
+            custom_mode=mode.custom_mode,
+            properties=mode.properties,
+            number_modes=len(firmware.modes),
+            mode_index=i,
+            standard_mode=mode.standard_mode,
+            mode_name=mode.name.encode(),
         )
         for i, mode in enumerate(firmware.modes, 1)
         if index in (0, i)
     ]
 
 
-def statustexts(firmware: Firmware, text: Text, number: int) -> list[MAVLink_message]:
-    """One text as it goes out. PX4 numbers every text, others only those that need chunks; a text that ends with a
-    full chunk gets an empty one more, for only a short chunk says that it is the last."""
+def statustexts(firmware: Firmware, text: Text, number: int) -> list[NamedTuple]:
+    """The STATUSTEXT messages of one text. PX4 numbers every text, others only texts in several chunks. An empty chunk
+    follows a full last chunk, because only a short chunk marks the end."""
     data = text.text.encode()
     if firmware.autopilot != PX4 and len(data) <= CHUNK:
-        return [MAVLink_statustext_message(text.severity, data)]
+        return [Statustext(text.severity, data, 0, 0)]
     chunks = [data[i : i + CHUNK] for i in range(0, len(data) + 1, CHUNK)]
-    return [MAVLink_statustext_message(text.severity, chunk, number, i) for i, chunk in enumerate(chunks)]
+    return [Statustext(text.severity, chunk, number, i) for i, chunk in enumerate(chunks)]

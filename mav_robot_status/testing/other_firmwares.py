@@ -1,7 +1,7 @@
-"""More firmwares that can be played: ArduPilot's other vehicles, PX4 on a VTOL, INAV and Betaflight.
+"""More firmwares of scenarios: the other vehicles of ArduPilot, PX4 on a VTOL, INAV and Betaflight.
 
-Numbers, texts and their order are those of ArduPilot 4.5.6, INAV 9.0.0 and Betaflight 2026.12-alpha, seen in simulation
-with the real firmware; for the tracker, the blimp and PX4's VTOL those of the source.
+Numbers, texts and their order are those of ArduPilot 4.5.6, INAV 9.0.0 and Betaflight 2026.12-alpha, observed in
+simulation with the real firmware. Those of the tracker, the blimp and PX4's VTOL are from the source code.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def _servos_at_rest(s: VehicleState) -> tuple[int, ...]:
 
 
 def _start(ready: VehicleState, initialising: bool = False) -> dict[str, Any]:
-    """How an ArduPilot comes to be ready. A real estimator takes some 20 s to find its position."""
+    """The boot of an ArduPilot. A real estimator needs about 20 s to find its position."""
     without = ready.sensors_enabled & ~(AHRS | GPS)
     booting = ready._replace(
         custom_mode=INITIALISING if initialising else ready.custom_mode,
@@ -61,7 +61,7 @@ def _start(ready: VehicleState, initialising: bool = False) -> dict[str, Any]:
     texts = (6, "ArduPilot Ready"), (6, "AHRS: DCM active")
     boot = (
         step(0.7, "booted", *texts, custom_mode=ready.custom_mode),
-        step(1.0, "SYS_STATUS begins; the pre-arm checks fail, for there is no position yet", initialised=True),
+        step(1.0, "SYS_STATUS begins; the pre-arm checks fail without a position", initialised=True),
         step(
             6.0,
             "the position is known: the pre-arm checks pass",
@@ -96,7 +96,7 @@ ARDUPLANE = ARDUCOPTER._replace(
     **_start(_with_sensors(0x1361FC3F, **_ON_GROUND), initialising=True),
 )
 
-# The same firmware, and the same type on the wire: only vtol_state tells.
+# The same firmware and the same MAV_TYPE; only vtol_state differs.
 QUADPLANE = ARDUPLANE._replace(name="ArduPilot QuadPlane", vtol_state=4)
 
 ARDUSUB = ARDUCOPTER._replace(
@@ -141,7 +141,7 @@ PX4_VTOL = PX4_QUAD._replace(
 
 _INAV_SENSORS = 0x0101000F
 
-# It claims to be an ArduPilot. It hears no commands, and tells its speed in VFR_HUD only.
+# INAV identifies as ArduPilot, ignores commands, and reports its speed only in VFR_HUD.
 INAV_ROVER = ARDUROVER._replace(
     name="INAV rover",
     base_modes={0: 65} | dict.fromkeys((4, 5, 23), 81) | dict.fromkeys((10, 11, 12), 89),
@@ -166,7 +166,7 @@ INAV_QUAD = INAV_ROVER._replace(
     ready=INAV_ROVER.ready._replace(custom_mode=1),
 )
 
-# Present and enabled, and never healthy: the control bits 10 to 13, and the motor outputs.
+# Present and enabled, but never healthy: the control bits 10 to 13, and the motor outputs.
 _BETAFLIGHT_SENSORS, _BETAFLIGHT_HEALTH = 0xBC0F, 0x0F
 
 BETAFLIGHT = INAV_QUAD._replace(
@@ -176,7 +176,7 @@ BETAFLIGHT = INAV_QUAD._replace(
     streams={0: 2.0, 1: 2.0, 2: 2.0, 30: 2.0, 74: 2.0},
     arming_refused="Arming disabled: {}",
     booting=_with_sensors(_BETAFLIGHT_SENSORS, prearm="BOOTGRACE")._replace(sensors_health=_BETAFLIGHT_HEALTH),
-    boot=(step(4.0, "the grace of the boot is over", prearm=""),),
+    boot=(step(4.0, "the grace period after the boot ends", prearm=""),),
     ready=_with_sensors(_BETAFLIGHT_SENSORS)._replace(sensors_health=_BETAFLIGHT_HEALTH),
     modes=(
         Mode(0, "Acro"),

@@ -1,4 +1,4 @@
-"""What a scenario is: data that says what a vehicle does when. See `scenarios` for those that come along."""
+"""Scenarios as data: the actions of a vehicle and their times. See `scenarios` for the ready ones."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ GPS = 1 << 5
 
 
 class VehicleState(NamedTuple):
-    """What is the case inside the vehicle. `firmware` turns it into what that firmware says on the wire."""
+    """The state of a vehicle. `firmware` translates it to the messages of that firmware."""
 
     custom_mode: int = 0
     armed: bool = False
     prearm: str = ""
-    """Why the vehicle cannot be armed, in the firmware's words without prefix; empty if it can."""
+    """Why the vehicle cannot be armed: the firmware's text without prefix; empty if it can."""
     failsafe: bool = False
     """Any failsafe is active: HEARTBEAT.system_status becomes CRITICAL."""
     emergency_stop: bool = False
-    """The motors are held at their stop value. ArduPilot: RC or aux e-stop, no bit shows it; PX4: kill, state 8."""
+    """The motors are held at their stop value. ArduPilot: RC or aux e-stop, not reported; PX4: kill, MAV_STATE 8."""
     safety_switch: bool = False
     """ArduPilot's hardware safety switch is on: MOTOR_OUTPUTS is present but not enabled."""
     initialised: bool = True
-    """ArduPilot sends no SYS_STATUS before."""
+    """Before this, ArduPilot sends no SYS_STATUS."""
     sensors_present: int = 0
     sensors_enabled: int = 0
     sensors_health: int = 0
@@ -39,7 +39,7 @@ class VehicleState(NamedTuple):
     landed_state: int = 0
     """MAV_LANDED_STATE: 0 undefined, 1 on the ground, 2 in the air, 3 taking off, 4 landing."""
     vtol_state: int | None = None
-    """MAV_VTOL_STATE: 1 and 2 in transition, 3 hovering, 4 on its wings; None: as the firmware says it."""
+    """MAV_VTOL_STATE: 1 and 2 in transition, 3 hovering, 4 on its wings; None: the default of the firmware."""
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """North, east, down in m/s."""
     rates: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -47,41 +47,41 @@ class VehicleState(NamedTuple):
     throttle: int = 0
     """VFR_HUD.throttle in percent; the motor outputs follow it."""
     servos: tuple[int, ...] | None = None
-    """SERVO_OUTPUT_RAW in microseconds; None: as the firmware makes them of throttle, armed and emergency_stop."""
+    """SERVO_OUTPUT_RAW in microseconds; None: computed from throttle, armed and emergency_stop."""
     position: bool = True
     """False: no GPS fix yet, so that latitude and longitude are 0."""
     base_mode: int | None = None
     system_status: int | None = None
-    """HEARTBEAT fields; None: as the firmware derives them."""
+    """HEARTBEAT fields; None: computed by the firmware."""
 
 
 class Text(NamedTuple):
-    """One STATUSTEXT; longer than 50 characters goes out in chunks."""
+    """One STATUSTEXT; more than 50 characters are sent in chunks."""
 
     severity: int
     text: str
 
 
 class Action(Enum):
-    """What happens to the link or to the autopilot as a whole."""
+    """An event of the link or of the whole autopilot."""
 
     SILENCE = "silence"
-    """The link is cut: nothing is sent or heard any more, while the vehicle goes on."""
+    """The link is cut in both directions; the vehicle continues."""
     RESUME = "resume"
     """The link is back."""
     REBOOT = "reboot"
-    """The autopilot starts again: a gap of 1.2 s, time_boot_ms and sequence from 0, requested streams forgotten."""
+    """The autopilot restarts: silence for 1.2 s, then time_boot_ms and sequence from 0, and no requested streams."""
     END = "end"
-    """The scenario is over: nothing is sent any more."""
+    """The scenario ends: nothing more is sent."""
 
 
 class Step(NamedTuple):
-    """What changes at one moment."""
+    """The changes at one time."""
 
     at: float
     """Seconds since the start of the scenario."""
     note: str
-    """One line for a person who watches: what happens and why."""
+    """One line for the log: the event and its reason."""
     changes: Mapping[str, Any]
     """Fields of `VehicleState` and their new values."""
     texts: tuple[Text, ...] = ()
@@ -89,14 +89,14 @@ class Step(NamedTuple):
 
 
 class Scenario(NamedTuple):
-    """A vehicle and its story."""
+    """A vehicle and its steps."""
 
     title: str
     firmware: Firmware
     start: VehicleState
     steps: tuple[Step, ...] = ()
     streams: Mapping[int, float] | None = None
-    """Message id to Hz: what flows without being asked for; None: the firmware's own defaults."""
+    """Message id to Hz: the streams that run without a request; None: the defaults of the firmware."""
 
     @property
     def duration(self) -> float:
@@ -105,7 +105,7 @@ class Scenario(NamedTuple):
 
 
 def step(at: float, note: str, *texts: tuple[int, str], action: Action | None = None, **changes: Any) -> Step:
-    """A `Step` in short: texts as (severity, text), changes as keywords.
+    """Build a `Step`, with texts as (severity, text) and changes as keywords.
 
     Raises ValueError (TypeError from Python 3.13) for an unknown field.
     """

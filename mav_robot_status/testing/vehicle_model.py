@@ -1,4 +1,4 @@
-"""`VehicleModel`: which messages are due when. No socket, no thread, no clock: times come in, messages go out."""
+"""`VehicleModel`: which messages are due, and when. It has no socket, thread or clock: time is an argument."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from ..clock import Instant
-from ..mavlink.pymavlink_dialect import MAVLink_message
+from .codec import encode
 from .firmware import ARDUPILOT, PX4, not_armable
 from .messages import BUILDERS, HEARTBEAT, SYS_STATUS, Snapshot, heartbeat, statustexts
 from .scenario import Action, Scenario, Step, Text
@@ -14,26 +14,31 @@ from .scenario import Action, Scenario, Step, Text
 REBOOT_GAP = 1.2
 """Seconds from the command to the first HEARTBEAT of the new boot, as recorded."""
 PREARM_TICK = -1
-"""Stands among the streams: the pre-arm checks run once a second."""
+"""An entry among the streams: the pre-arm checks run once a second."""
 PREARM_REPEAT = 30.0
-"""Seconds after which ArduPilot repeats why it cannot be armed."""
+"""Seconds after which ArduPilot repeats why it cannot arm."""
 SAME_TIME = 1e-6
-"""Seconds: what is due so little later is due now, for sums of intervals are not exact."""
+"""Tolerance of due times in seconds, because sums of intervals are not exact."""
 CATCH_UP = 10.0
-"""Seconds of streams that are made up for after a pause; more would flood the receiver."""
+"""The most seconds of streams that are sent after a pause; more would flood the receiver."""
 
 
 class Outgoing(NamedTuple):
-    """A message and the sequence number that it is sent with."""
+    """A message and its sequence number."""
 
-    message: MAVLink_message
+    message: NamedTuple
+    """One of `testing.definitions`."""
     seq: int
+
+    def frame(self, system: int = 1, component: int = 1) -> bytes:
+        """The unsigned MAVLink 2 frame, sent by this system and component."""
+        return encode(self.message, system=system, component=component, sequence=self.seq)
 
 
 class VehicleModel:
     """One vehicle that plays a scenario. `start` and all times are seconds on a monotonic clock.
 
-    `speed` makes the scenario's steps pass faster; the streams keep their rates. `tell` is called with each step.
+    `speed` makes the scenario's steps pass faster; the streams keep their rates. `on_step` is called with each step.
     """
 
     def __init__(
@@ -42,14 +47,14 @@ class VehicleModel:
         start: float,
         speed: float = 1.0,
         loop: bool = False,
-        tell: Callable[[Step], None] = lambda step: None,
+        on_step: Callable[[Step], None] = lambda step: None,
     ) -> None:
         self.scenario = scenario
         self.firmware = scenario.firmware
         self.state = scenario.start
         self._speed = speed
         self._loop = loop
-        self._tell = tell
+        self._on_step = on_step
         self._out: list[Outgoing] = []
         self._now = start
         self._unix_us = 0
@@ -64,11 +69,11 @@ class VehicleModel:
         self._boot(at)
 
     def _boot(self, at: float) -> None:
-        """All that a reboot forgets."""
+        """Reset what a reboot resets."""
         self.boot = at
         self._seq = 0
         self._texts = 0
-        self.heard = self.gcs_heard = False
+        self.peer_seen = self.gcs_seen = False
         self._prearm_ok = not not_armable(self.state)
         self._prearm_said = at
         self._intervals = {HEARTBEAT: 1.0, PREARM_TICK: 1.0}
@@ -82,7 +87,7 @@ class VehicleModel:
 
     @property
     def default_streams(self) -> dict[int, float]:
-        """Message id to Hz: what flows without being asked for."""
+        """Message id to Hz: the streams that run without a request."""
         streams = self.scenario.streams
         return dict(self.firmware.streams if streams is None else streams)
 
@@ -93,11 +98,11 @@ class VehicleModel:
 
     @property
     def listening(self) -> bool:
-        """True if the vehicle could hear a message now."""
+        """Whether the vehicle can receive a message now."""
         return not (self.silent or self.ended) and self._now >= self.boot
 
     def run(self, now: Instant) -> list[Outgoing]:
-        """Let time pass until `now`; all that became due, in order."""
+        """Advance to `now`; the messages that became due, in order."""
         unix_at_zero = now.unix_us - now.mono * 1e6
         for message, due in self._due.items():
             self._due[message] = max(due, now.mono - CATCH_UP)
@@ -126,7 +131,7 @@ class VehicleModel:
             self.send(BUILDERS[message_id](self.snapshot()))
 
     def _check_prearm(self) -> None:
-        """ArduPilot announces failing checks when they begin to fail, and every 30 s."""
+        """ArduPilot announces failing checks when they start to fail, and every 30 s after that."""
         before, reason = self._prearm_ok, not_armable(self.state)
         self._prearm_ok = self.state.armed or not reason
         if self._prearm_ok or not self.firmware.prearm_prefix:
@@ -136,12 +141,12 @@ class VehicleModel:
             self.say(Text(2, self.firmware.prearm_prefix + reason))
 
     def snapshot(self) -> Snapshot:
-        """All that a message is made of, as of now."""
+        """The inputs of a message, at the current time."""
         boot_ms = round(max(0.0, self._now - self.boot) * 1000)
         return Snapshot(self.firmware, self.state, self._prearm_ok, boot_ms, self._unix_us)
 
-    def send(self, message: MAVLink_message) -> None:
-        """Send a message now. What a cut link swallows is counted by its sequence number nevertheless."""
+    def send(self, message: NamedTuple) -> None:
+        """Send a message now. A message on a cut link also uses a sequence number."""
         if self._now < self.boot or self.ended:
             return
         if not self.silent:
@@ -149,26 +154,26 @@ class VehicleModel:
         self._seq = (self._seq + 1) % 256
 
     def say(self, text: Text) -> None:
-        """Send a STATUSTEXT: PX4 only to a ground station, others where they heard something or streams flow."""
+        """Send a STATUSTEXT: PX4 only to a ground station, others after a received message or while streams run."""
         streaming = len(self._intervals) > 2
-        if self.gcs_heard if self.firmware.autopilot == PX4 else self.heard or streaming:
+        if self.gcs_seen if self.firmware.autopilot == PX4 else self.peer_seen or streaming:
             self._texts = self._texts % 0xFFFF + 1
             for message in statustexts(self.firmware, text, self._texts):
                 self.send(message)
 
     def do(self, step: Step) -> None:
-        """Take a step now: a scenario's own, or one from outside."""
+        """Apply a step now."""
         before, self.state = self.state, self.state._replace(**step.changes)
         if step.note:
-            self._tell(step)
-        # A mode change is told at once, arming only by the next regular HEARTBEAT; PX4 hurries with neither.
+            self._on_step(step)
+        # ArduPilot reports a mode change at once, arming with the next regular HEARTBEAT; PX4 reports both with it.
         if self.state.custom_mode != before.custom_mode and self.firmware.autopilot == ARDUPILOT:
             self.send(heartbeat(self.snapshot()))
-        for text in step.texts:
-            self.say(text)
-        words = self.firmware.armed_text if self.state.armed else self.firmware.disarmed_text
-        if self.state.armed != before.armed and words:
-            self.say(Text(6, words))
+        for step_text in step.texts:
+            self.say(step_text)
+        text = self.firmware.armed_text if self.state.armed else self.firmware.disarmed_text
+        if self.state.armed != before.armed and text:
+            self.say(Text(6, text))
         if step.action is not None:
             self._act(step.action)
 

@@ -1,1 +1,1 @@
-"""What is shown to a person of the statuses: a flight as a picture. Knows the interface's values, and no MAVLink."""
+"""Views for people: a report of a flight, a live table. They use the values of `interface`, not MAVLink."""

@@ -1,4 +1,4 @@
-"""How far a long read has come: one line on a terminal, gone when it is done."""
+"""The progress of a long read: one line on a terminal, removed at the end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ERASE: Final = "\033[K"
 
 
 class ProgressLine:
-    """A bar, drawn anew for each per cent. Says nothing where there is no terminal."""
+    """A progress bar, redrawn at each per cent. It prints nothing without a terminal."""
 
     def __init__(self, stream: TextIO, what: str) -> None:
         self._stream = stream
@@ -22,7 +22,7 @@ class ProgressLine:
         self._on = stream.isatty()
 
     def __call__(self, share: float) -> None:
-        """Show a share from 0 to 1. The cursor stays in front, so that a line of the log overwrites the bar."""
+        """Show a share from 0 to 1. The cursor stays at the start, so that a log line overwrites the bar."""
         percent = int(share * 100)
         if self._on and percent != self._shown:
             self._shown = percent
@@ -31,7 +31,7 @@ class ProgressLine:
             self._stream.flush()
 
     def close(self) -> None:
-        """Take the line away."""
+        """Remove the line."""
         if self._shown >= 0:
             self._stream.write(ERASE)
             self._stream.flush()

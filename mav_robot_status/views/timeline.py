@@ -1,7 +1,7 @@
-"""A flight as intervals: what each handle said, from when to when. Fed with handles and instants, or values alone.
+"""A flight as intervals: the values of each handle over time.
 
-Times inside a timeline are whole microseconds since the log's first record, on a clock that never steps. Where the
-log's clock was set a new segment begins: nothing goes on across it, and each segment has its own place in UTC.
+Times inside a timeline are whole microseconds since the log's first record, on a clock that never steps. When the
+log's clock is set, a new segment begins: no interval spans it, and each segment has its own time in UTC.
 """
 
 from __future__ import annotations
@@ -10,35 +10,34 @@ import bisect
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ..interface import LinkState, RobotMode, RobotStatus, TriState
+from ..interface import STATES, LinkState, TriState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from ..clock import Instant
-    from ..interface import Detail, Evidence, IndustrialRobotStatusHandle
+    from ..interface import Detail, Evidence, IndustrialRobotStatusHandle, RobotStatus
 
-FIELDS: Final = RobotStatus._fields[:-1]
-TRACKS: Final = ("link", "flight_mode", "armed", *FIELDS)
-"""What is followed of each vehicle, one value at a time."""
+TRACKS: Final = ("link", "flight_mode", "armed", *(field.name for field in STATES))
+"""The tracks of each vehicle. A track has one value at a time."""
 NO_NAME: Final = ""
-"""The flight mode where there is none, or none is known."""
+"""The flight mode of a vehicle that has none, or whose mode is unknown."""
 
 
 class Span(NamedTuple):
-    """A value that one track had for a while."""
+    """A value of one track over an interval."""
 
     start: int
     end: int
     value: str
-    """A state's name, or a flight mode's; see TRACKS."""
+    """The name of a state or of a flight mode; see TRACKS."""
     rule: str | None = None
-    """Why it began, where the hardware tells: the rule that decided, and what it read."""
+    """The evidence at its start, if the hardware gives some: the rule, and in `source` the message that it read."""
     source: str | None = None
 
 
 class Reason(NamedTuple):
-    """An error cause or an inhibit with one text; when its text changes, another one goes on."""
+    """An error cause or an inhibit with one text. A new text begins a new interval."""
 
     start: int
     end: int
@@ -49,7 +48,7 @@ class Reason(NamedTuple):
 
 
 class Segment(NamedTuple):
-    """A stretch of the log in which its clock was not set."""
+    """A part of the log in which its clock was not set."""
 
     start: int
     end: int
@@ -59,7 +58,7 @@ class Segment(NamedTuple):
 
 @dataclass
 class VehicleTimeline:
-    """What was known of one vehicle."""
+    """The intervals of one vehicle."""
 
     handle: str
     system: int | None = None
@@ -67,15 +66,15 @@ class VehicleTimeline:
     autopilot: str | None = None
     type: str | None = None
     tracks: dict[str, list[Span]] = field(default_factory=lambda: {name: [] for name in TRACKS})
-    """In time, without overlaps; a value that lasts is one span. Gaps: before the vehicle was heard."""
+    """In order of time, without overlaps. There is a gap before the first heartbeat."""
     errors: list[Reason] = field(default_factory=list)
     inhibits: list[Reason] = field(default_factory=list)
-    """By their ends; those of one name do not overlap."""
+    """In order of their ends. Intervals of the same name do not overlap."""
 
 
 @dataclass
 class Timeline:
-    """What was known of the vehicles of one log."""
+    """The intervals of all vehicles of one log."""
 
     name: str
     segments: list[Segment] = field(default_factory=list)
@@ -83,26 +82,26 @@ class Timeline:
 
     @property
     def end(self) -> int:
-        """How long the log is."""
+        """The length of the log, in microseconds."""
         return self.segments[-1].end if self.segments else 0
 
     def unix_us(self, start: int, at: int) -> int:
-        """UTC of `at`, the end of something that began at `start`: both are of one segment."""
+        """UTC of `at`, the end of an interval that began at `start`. Both are in one segment."""
         index = bisect.bisect_right(self.segments, start, key=lambda segment: segment.start) - 1
         segment = self.segments[max(0, index)]
         return segment.unix_us + at - segment.start
 
 
 class TimelineBuilder:
-    """Makes a timeline: `begin`, `look` at what is so whenever it may have changed, `end`."""
+    """Builds a timeline: call `begin`, then `sample` whenever a handle may have changed, then `end`."""
 
     def __init__(self, name: str) -> None:
         self.timeline = Timeline(name)
         self._origin = 0.0
-        self._watches: dict[str, _Watch] = {}
+        self._recorders: dict[str, _Recorder] = {}
 
     def begin(self, now: Instant) -> None:
-        """The log begins, or its clock was set: what was known before ends here."""
+        """The log begins, or its clock was set. All intervals end here."""
         if not self.timeline.segments:
             self._origin = now.mono
         else:
@@ -110,28 +109,28 @@ class TimelineBuilder:
         at = self._elapsed(now)
         self.timeline.segments.append(Segment(at, at, now.unix_us))
 
-    def look(self, handles: Iterable[IndustrialRobotStatusHandle], now: Instant) -> None:
-        """Take what the handles say at `now`."""
+    def sample(self, handles: Iterable[IndustrialRobotStatusHandle], now: Instant) -> None:
+        """Record the values of the handles at `now`."""
         for handle in handles:
-            watch = self._watches.get(handle.name)
-            if watch is None:
-                watch = self._watches[handle.name] = _Watch(VehicleTimeline(handle.name))
-                self.timeline.vehicles.append(watch.vehicle)
-            watch.look(handle, self._elapsed(now))
+            recorder = self._recorders.get(handle.name)
+            if recorder is None:
+                recorder = self._recorders[handle.name] = _Recorder(VehicleTimeline(handle.name))
+                self.timeline.vehicles.append(recorder.vehicle)
+            recorder.sample(handle, self._elapsed(now))
 
     def end(self, now: Instant) -> None:
         """The log, or a segment of it, ends."""
         at = self._elapsed(now)
         self.timeline.segments[-1] = self.timeline.segments[-1]._replace(end=at)
-        for watch in self._watches.values():
-            watch.end(at)
+        for recorder in self._recorders.values():
+            recorder.end(at)
 
     def _elapsed(self, now: Instant) -> int:
         return round((now.mono - self._origin) * 1e6)
 
 
-class _Watch:
-    """What goes on of one vehicle."""
+class _Recorder:
+    """The open intervals of one vehicle."""
 
     def __init__(self, vehicle: VehicleTimeline) -> None:
         self.vehicle = vehicle
@@ -140,7 +139,7 @@ class _Watch:
         self._errors: dict[str, Reason] = {}
         self._inhibits: dict[str, Reason] = {}
 
-    def look(self, handle: IndustrialRobotStatusHandle, at: int) -> None:
+    def sample(self, handle: IndustrialRobotStatusHandle, at: int) -> None:
         status, detail = handle.status, handle.detail
         if self._seen is not None and self._seen[0] is status and self._seen[1] is detail:
             return
@@ -180,20 +179,19 @@ def values_of(status: RobotStatus, detail: Detail) -> dict[str, str]:
         "link": detail.link.value,
         "flight_mode": detail.vehicle.flight_mode or NO_NAME,
         "armed": _armed(detail).name,
-        "mode": RobotMode(status.mode).name,
-        **{name: TriState(getattr(status, name)).name for name in FIELDS[1:]},
+        **{field.name: field.word(getattr(status, field.name)) for field in STATES},
     }
 
 
 def _armed(detail: Detail) -> TriState:
-    """Whether the autopilot is armed: a vehicle that is heard says DISARMED where it is not."""
+    """Whether the autopilot is armed. A connected vehicle that is not armed has the inhibit DISARMED."""
     if detail.link is not LinkState.CONNECTED:
         return TriState.UNKNOWN
     return TriState(all(inhibit.name != "DISARMED" for inhibit in detail.inhibits))
 
 
 def _follow(is_open: dict[str, Reason], closed: list[Reason], active: Iterable[Reason], at: int) -> None:
-    """Close what is no longer active, or is with another text; open what is new."""
+    """Close reasons that ended or have a new text; open new ones."""
     now = {reason.name: reason for reason in active}
     for name, reason in list(is_open.items()):
         if name not in now or now[name].text != reason.text:
@@ -203,6 +201,6 @@ def _follow(is_open: dict[str, Reason], closed: list[Reason], active: Iterable[R
 
 
 def _close(into: list[Span] | list[Reason], what: Span | Reason, at: int) -> None:
-    """End something; what did not last at all was never so."""
+    """Close an interval. An empty one is left out."""
     if at > what.start:
         into.append(what._replace(end=at))  # type: ignore[arg-type]

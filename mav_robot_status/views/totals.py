@@ -1,4 +1,4 @@
-"""What a flight adds up to: how long each value lasted, how often and how long each reason was active, arm cycles."""
+"""Totals of a flight: the time in each value, the count and time of each reason, the arm cycles."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .timeline import Reason, Span, VehicleTimeline
 
 MOST_TEXTS: Final = 20
-"""Different texts that are listed of one reason."""
+"""Different texts listed for one reason."""
 
 
 class ReasonTotal(NamedTuple):
@@ -20,11 +20,11 @@ class ReasonTotal(NamedTuple):
     name: str
     code: int | None
     occurrences: int
-    """How often it became active."""
+    """The number of times it became active."""
     active: int
-    """Microseconds, without its interruptions."""
+    """Its active time in microseconds."""
     texts: tuple[str, ...]
-    """The different texts with it, the first MOST_TEXTS."""
+    """Its different texts, at most MOST_TEXTS."""
 
 
 class ArmCycle(NamedTuple):
@@ -33,20 +33,20 @@ class ArmCycle(NamedTuple):
     start: int
     end: int
     armed: int
-    """Microseconds in which it was known to be armed: less than the whole if the link was lost meanwhile."""
+    """Microseconds with the value armed. This is less than the cycle if the link was lost."""
 
 
 class Totals(NamedTuple):
     """One vehicle's flight. Times in microseconds."""
 
     watched: int
-    """Since the vehicle was first heard."""
+    """The time since the first heartbeat."""
     values: dict[str, dict[str, int]]
-    """How long each track had each value."""
+    """The time of each track in each value."""
     arm_cycles: tuple[ArmCycle, ...]
     errors: tuple[ReasonTotal, ...]
     inhibits: tuple[ReasonTotal, ...]
-    """Those that lasted longest first."""
+    """Errors and inhibits are in order of their active time, the longest first."""
 
 
 def totals(vehicle: VehicleTimeline) -> Totals:
@@ -62,7 +62,7 @@ def totals(vehicle: VehicleTimeline) -> Totals:
 
 
 def durations(spans: Iterable[Span]) -> dict[str, int]:
-    """How long each value lasted, the longest first."""
+    """The time in each value, the longest first."""
     lasted: dict[str, int] = defaultdict(int)
     for span in spans:
         lasted[span.value] += span.end - span.start
@@ -70,7 +70,7 @@ def durations(spans: Iterable[Span]) -> dict[str, int]:
 
 
 def arm_cycles(armed: Iterable[Span]) -> tuple[ArmCycle, ...]:
-    """The cycles of the track `armed`. One goes on through a lost link if the vehicle is found armed again."""
+    """The cycles of the track `armed`. A lost link does not end a cycle if the vehicle is armed afterwards."""
     cycles: list[ArmCycle] = []
     flying = False
     for span in armed:
@@ -85,7 +85,7 @@ def arm_cycles(armed: Iterable[Span]) -> tuple[ArmCycle, ...]:
 
 
 def reason_totals(reasons: Iterable[Reason]) -> tuple[ReasonTotal, ...]:
-    """Add up reasons by name. One that goes on with another text is still the same."""
+    """Add up reasons by name. A new text does not begin a new occurrence."""
     found: dict[str, ReasonTotal] = {}
     ended: dict[str, int] = {}
     for reason in sorted(reasons, key=lambda reason: reason.start):

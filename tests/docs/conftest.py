@@ -1,4 +1,4 @@
-"""A place where the documents' commands run: a folder with a recorded log and the example configurations."""
+"""The folder in which the documents' commands run: a recorded log and the example configurations."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def flight_log(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
 
 @pytest.fixture
 def place(tmp_path: pathlib.Path, flight_log: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> pathlib.Path:
-    """The folder, which is the current one; the commands of this Python's environment are found there."""
+    """The folder, as the current one, with the commands of this Python's environment on the path."""
     shutil.copy(flight_log, tmp_path)
     shutil.copytree(ROOT / "config", tmp_path / "config")
     monkeypatch.chdir(tmp_path)

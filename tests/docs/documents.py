@@ -1,4 +1,4 @@
-"""The documents as data: their blocks of code, links and tables."""
+"""The documents as data: blocks of code, links and tables."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 ROOT = pathlib.Path(__file__).parents[2]
-DOCUMENTS = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md")))
+TOP = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")
+DOCUMENTS = (*(ROOT / name for name in TOP), *sorted((ROOT / "docs").rglob("*.md")))
 
 _FENCE = re.compile(r"^( *)```(\S*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
@@ -20,13 +21,18 @@ class Block(NamedTuple):
 
     document: pathlib.Path
     line: int
-    """Of its first line of code."""
+    """The number of its first line of code."""
     language: str
     code: str
 
     @property
     def name(self) -> str:
-        return f"{self.document.name}:{self.line}"
+        return f"{name_of(self.document)}:{self.line}"
+
+
+def name_of(document: pathlib.Path) -> str:
+    """Its path in the repository."""
+    return document.relative_to(ROOT).as_posix()
 
 
 def blocks(*languages: str) -> list[Block]:
@@ -46,12 +52,12 @@ def prose(document: pathlib.Path) -> str:
 
 
 def links(document: pathlib.Path) -> list[str]:
-    """Where it points to inside the repository."""
+    """The links of a document to other files of the repository."""
     return [link for link in _LINK.findall(prose(document)) if "://" not in link]
 
 
 def table(name: str, first: str, heading: str = "") -> list[list[str]]:
-    """The rows of the table whose first column is headed `first`, below `heading`; back quotes are taken away."""
+    """The rows of the table whose first column is headed `first`, below `heading`, without back quotes."""
     lines = iter((ROOT / name).read_text().splitlines())
     if heading:
         next(line for line in lines if line == heading)

@@ -1,9 +1,8 @@
-"""What the documents list is what there is: tables, options, paths and pictures cannot drift from the code."""
+"""Tables, options, paths and pictures in the documents match the code."""
 
 from __future__ import annotations
 
 import dataclasses
-import pathlib
 import re
 import subprocess
 import sys
@@ -18,19 +17,19 @@ from mav_robot_status.config import Config, IdentityConfig, LinkConfig, SigningC
 from mav_robot_status.config.model import Or
 from mav_robot_status.config.reader import PARAMETERS
 from mav_robot_status.controller import DEFAULT_PUBLISH_RATE
-from mav_robot_status.gateway.plant import DEFAULT_PUBLISHERS
-from mav_robot_status.hardware.causes import CAUSES
-from mav_robot_status.hardware.fields.inhibits import INHIBITS
-from mav_robot_status.hardware.options import HardwareOptions, Within
+from mav_robot_status.gateway.controller_config import DEFAULT_PUBLISHERS
+from mav_robot_status.hardware.mavlink.causes import CAUSES
+from mav_robot_status.hardware.mavlink.options import HardwareOptions, Within
+from mav_robot_status.hardware.mavlink.rules.inhibits import INHIBITS
 from mav_robot_status.interface import DEFAULT_HANDLE_NAME, Detail, RobotStatus
-from mav_robot_status.link.url import KINDS
+from mav_robot_status.links.url import KINDS
 from mav_robot_status.publishers import metrics
 from mav_robot_status.publishers.json_lines import native_body
 
-from .documents import DOCUMENTS, ROOT, blocks, prose, table
+from .documents import DOCUMENTS, ROOT, blocks, links, name_of, prose, table
 
 WHOLE = ("gateway", "views", "hardware", "publishers", "interface")
-"""Folders of which the picture of the house shows every part."""
+"""Folders whose every part is in the picture of the architecture page."""
 OTHER_TOOLS = {"--dialect", "--check", "--reference"}  # options of MAVProxy, ruff and chown
 
 
@@ -50,9 +49,9 @@ def test_the_keys_of_a_section_with_defaults_and_units(heading: str, kind: Any) 
     expected = [
         [field.name, _default(field, get_args(hints[field.name])), _unit(get_args(hints[field.name]))]
         for field in dataclasses.fields(kind)
-        if field.name != "controllers"  # every other key at the top
+        if field.name not in ("controllers", "interfaces")  # every other key at the top; `hardware` as a list
     ]
-    assert [row[:3] for row in table("docs/configuration.md", "key", heading)] == expected
+    assert [row[:3] for row in table("docs/reference/configuration.md", "key", heading)] == expected
 
 
 def _default(field: dataclasses.Field[Any], rules: tuple[Any, ...]) -> str:
@@ -79,7 +78,7 @@ def _unit(rules: tuple[Any, ...]) -> str:
 
 
 def test_the_parameters_of_a_controller_with_their_defaults() -> None:
-    rows = table("docs/configuration.md", "key", "## A controller")
+    rows = table("docs/reference/configuration.md", "key", "## A controller")
     assert [row[0] for row in rows] == list(PARAMETERS)
     defaults = [DEFAULT_HANDLE_NAME, f"{DEFAULT_PUBLISH_RATE:g}", "true", ", ".join(p.type for p in DEFAULT_PUBLISHERS)]
     assert [row[1] for row in rows] == defaults
@@ -88,7 +87,7 @@ def test_the_parameters_of_a_controller_with_their_defaults() -> None:
 def test_the_members_of_a_line() -> None:
     body = native_body("", RobotStatus(), Detail())
     members = re.findall(r'"(\w+)": ', re.sub(r"\{[^}]*\}?", "{}", body))
-    assert [row[0] for row in table("docs/json.md", "member")] == ["stamp", "seq", *members]
+    assert [row[0] for row in table("docs/reference/json.md", "member")] == ["stamp", "seq", *members]
 
 
 @pytest.mark.parametrize(
@@ -101,7 +100,7 @@ def test_the_members_of_a_line() -> None:
     ],
 )
 def test_the_metrics_with_their_kinds(of: str, families: tuple[metrics.Family, ...]) -> None:
-    rows = [(name, kind, words) for name, kind, _, words in table("docs/metrics.md", of)]
+    rows = [(name, kind, words) for name, kind, _, words in table("docs/reference/metrics.md", of)]
     assert rows == [(metrics.PREFIX + family.name, family.kind, family.help) for family in families]
 
 
@@ -110,12 +109,12 @@ def test_the_fields_of_the_readme() -> None:
 
 
 def test_the_reasons_in_the_order_of_their_bits() -> None:
-    assert [row[0] for row in table("docs/json.md", "name")] == INHIBITS
+    assert [row[0] for row in table("docs/reference/json.md", "name")] == INHIBITS
 
 
 def test_the_kinds_of_error_codes() -> None:
     kinds = {code // 1000 for code in CAUSES}
-    assert [int(row[0]) for row in table("docs/json.md", "code / 1000")] == sorted(kinds)
+    assert [int(row[0]) for row in table("docs/reference/json.md", "code / 1000")] == sorted(kinds)
 
 
 def test_the_fields_of_robot_status_with_their_types() -> None:
@@ -123,7 +122,7 @@ def test_the_fields_of_robot_status_with_their_types() -> None:
     assert message is not None
     assert message.get("id") == "59900"
     fields = [[field.get("name"), field.get("type")] for field in message.iter("field")]
-    assert [row[:2] for row in table("docs/mavlink.md", "field")] == fields
+    assert [row[:2] for row in table("docs/reference/mavlink.md", "field")] == fields
 
 
 def test_the_connections_are_those_of_the_table_of_kinds() -> None:
@@ -137,7 +136,7 @@ def test_every_deviation_from_the_original_controller_is_listed() -> None:
         for path in package.rglob("*.py")
         for _ in re.findall(r"ORIGINAL: \w", path.read_text())
     )
-    listed = sorted(row[0].split(",")[0] for row in table("docs/controller.md", "where"))
+    listed = sorted(row[0].split(",")[0] for row in table("docs/explanation/controller.md", "where"))
     assert listed == in_code
 
 
@@ -148,44 +147,104 @@ def _help(*module: str) -> str:
 
 def test_every_option_that_is_mentioned_exists() -> None:
     command = ["mav_robot_status.cli"]
-    helps = [_help(*command, name) for name in COMMANDS] + [_help("fuzz"), _help("bench"), _help("bench.guard")]
+    helps = [_help(*command), *(_help(*command, name) for name in COMMANDS)]
+    helps += [_help("fuzz"), _help("bench"), _help("bench.guard")]
     for document in DOCUMENTS:
         mentioned = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", document.read_text()))
-        assert mentioned - OTHER_TOOLS <= set(re.findall(r"--[a-z-]+", "".join(helps))), document.name
+        assert mentioned - OTHER_TOOLS <= set(re.findall(r"--[a-z-]+", "".join(helps))), name_of(document)
 
 
 def test_every_path_that_is_mentioned_exists() -> None:
     for document in DOCUMENTS:
         for path in re.findall(r"`((?:mav_robot_status|tests|dialects|config|docs|\.ci)/[^`\s]*)`", prose(document)):
-            assert (ROOT / path).exists(), f"{document.name}: {path}"
+            assert (ROOT / path).exists(), f"{name_of(document)}: {path}"
 
 
-def test_the_index_lists_every_document() -> None:
-    pages = {path.name for path in (ROOT / "docs").glob("*.md")} - {"index.md"}
-    text = (ROOT / "docs" / "index.md").read_text()
-    assert {page for page in pages if f"]({page})" in text} == pages
+@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "docs/architecture.md"])
+def test_the_places_where_a_change_goes_exist(page: str) -> None:
+    rows = [line for line in (ROOT / page).read_text().splitlines() if line.startswith("|")]
+    folders = "hardware|links|publishers|interface|gateway|testing|mavlink|data"
+    places = re.findall(rf"`((?:{folders})/[^`<]*)", "".join(rows))
+    assert places
+    for place in places:
+        assert (ROOT / "mav_robot_status" / place).exists(), place
 
 
-def test_the_picture_of_the_house_shows_what_there_is() -> None:
+@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "docs/architecture.md"])
+def test_the_tables_that_a_change_extends_exist_in_the_modules_that_are_named(page: str) -> None:
+    rows = [line for line in (ROOT / page).read_text().splitlines() if line.startswith("|")]
+    named = re.findall(r"`([A-Z]\w+)` in `((?:hardware|links|gateway|interface)/[^`<]*\.py)`", "".join(rows))
+    assert {"KINDS", "OURS", "RobotStatus"} <= {name for name, _ in named}
+    for name, module in named:
+        code = (ROOT / "mav_robot_status" / module).read_text()
+        assert re.search(rf"^(class )?{name}\b", code, re.MULTILINE), f"{page}: {name} in {module}"
+
+
+def test_both_pages_give_the_same_seven_places() -> None:
+    short, long = ([row[0] for row in table(page, "a new ...")] for page in ("docs/architecture.md", "CONTRIBUTING.md"))
+    assert len(short) == 7
+    assert long == short
+
+
+@pytest.mark.parametrize("folder", ["", "decisions", "semantics"])
+def test_an_index_lists_every_page_of_its_folder(folder: str) -> None:
+    index = ROOT / "docs" / folder / "index.md"
+    own = ROOT / "docs" / "decisions", ROOT / "docs" / "semantics"
+    pages = set(index.parent.rglob("*.md")) - {index}
+    if not folder:
+        pages = {page for page in pages if page.parent not in own or page.name == "index.md"}
+    listed = {(index.parent / link.partition("#")[0]).resolve() for link in links(index)}
+    assert sorted(pages - listed) == []
+
+
+def test_the_picture_of_the_architecture_shows_every_part() -> None:
     picture = next(block for block in blocks("text") if block.document.name == "architecture.md").code
-    folder: pathlib.Path | None = None
+    folders = [ROOT / "mav_robot_status"]
     top = set()
     drawn: dict[str, str] = {}
     for line in picture.splitlines()[1:]:
-        found = re.match(r"(│   )?[├└]── (\S+)", line)
+        found = re.match(r"((?:[│ ]   )*)[├└]── (\S+)", line)
         assert found, line
-        if found[1]:
-            assert folder is not None
-            path = folder / found[2]
-        else:
-            path = folder = ROOT / "mav_robot_status" / found[2]
-            top.add(found[2].rstrip("/"))
+        depth = len(found[1]) // 4
+        path = folders[depth] / found[2]
         assert path.exists(), line
-        drawn[folder.name] = drawn.get(folder.name, "") + line
+        if depth == 0:
+            top.add(found[2].rstrip("/"))
+        if path.is_dir():
+            folders[depth + 1 :] = [path]
+        for folder in folders[1:]:
+            drawn[folder.name] = drawn.get(folder.name, "") + line
         for file in re.findall(r"\b\w+\.py\b", line.partition(found[2])[2]):
-            assert (folder / file).exists() or (ROOT / "dialects" / file).exists(), line
+            assert any((place / file).exists() for place in (path, path.parent)), line
     there_is = {p.name for p in (ROOT / "mav_robot_status").iterdir() if p.suffix in ("", ".py") and p.name[0] != "_"}
     assert top == there_is
     for name in WHOLE:
         parts = {p.name for p in (ROOT / "mav_robot_status" / name).iterdir() if p.name[0] != "_"} - {"assets"}
         assert {part for part in parts if part not in drawn[name]} == set(), name
+
+
+def test_every_source_that_the_semantics_cite_is_listed() -> None:
+    listed = {row[0] for row in table("docs/semantics/sources.md", "n")}
+    for page in (ROOT / "docs" / "semantics").glob("*.md"):
+        cited = set(re.findall(r"\[(S\d+)b?c?\]", page.read_text()))
+        assert sorted(cited - listed) == [], name_of(page)
+
+
+def test_every_sequence_of_the_semantics_has_a_test_and_every_test_a_sequence() -> None:
+    tests = (ROOT / "tests" / "unit" / "hardware" / "mavlink" / "test_sequences.py").read_text()
+    assert re.findall(r'"""(Q\d\d)', tests) == [row[0] for row in table("docs/semantics/sequences.md", "#")]
+
+
+def test_every_anchor_of_a_link_is_a_heading() -> None:
+    for document in DOCUMENTS:
+        for link in links(document):
+            path, _, anchor = link.partition("#")
+            if anchor:
+                target = document.parent / path if path else document
+                headings = re.findall(r"^#+ (.*)$", prose(target), re.MULTILINE)
+                assert anchor in {_anchor(heading) for heading in headings}, f"{name_of(document)}: {link}"
+
+
+def _anchor(heading: str) -> str:
+    """As GitHub makes it."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")

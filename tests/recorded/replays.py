@@ -1,4 +1,4 @@
-"""Replaying a log as the command does, and judging its lines against ground truth."""
+"""Replays a log as the command does, and compares its lines with the ground truth."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from mav_robot_status.config import Config, ControllerConfig, PublisherConfig
-from mav_robot_status.gateway.plant import DEFAULT_CONTROLLER
+from mav_robot_status.gateway.controller_config import DEFAULT_CONTROLLER
 from mav_robot_status.gateway.replay import replay
-from mav_robot_status.hardware.options import HardwareOptions
+from mav_robot_status.hardware.mavlink.options import HardwareOptions
 
 HERE = pathlib.Path(__file__).parent
 OURS = HERE / "logs"
 SHARED = HERE.parents[2] / "shared" / "recordings"
-OLDEST = 2.0  # s: an older line says nothing about a moment
+NO_LARGE_SET = f"the large set of recordings is not in {SHARED}: see tests/recorded/logs/README.md"
+OLDEST = 2.0  # s: an older line does not count
 FIELDS = ("mode", "e_stopped", "drives_powered", "motion_possible", "in_motion", "in_error")
 
 
@@ -39,7 +40,7 @@ def lines_of(log: pathlib.Path, options: HardwareOptions | None = None) -> list[
 
 
 def broken_invariants(line: dict[str, Any]) -> Iterator[str]:
-    """The names of the invariants I1 to I4 that a line breaks, and of what the line promises beside them."""
+    """The rules that a line breaks: the invariants I1 to I4, and others."""
     if line["e_stopped"] is True and line["drives_powered"] is not False:
         yield "I1"
     if line["drives_powered"] is False and line["motion_possible"] is not False:
@@ -57,7 +58,7 @@ def broken_invariants(line: dict[str, Any]) -> Iterator[str]:
 
 
 class Judgement(NamedTuple):
-    """One checkpoint: right, honest (unknown where that is accepted), unknown, WRONG or missing."""
+    """The verdict on one checkpoint: right, honest (an accepted UNKNOWN), unknown, WRONG or missing."""
 
     verdict: str
     field: str
@@ -66,7 +67,7 @@ class Judgement(NamedTuple):
 
 
 def judged(truth_file: pathlib.Path, log: pathlib.Path, options: HardwareOptions | None = None) -> list[Judgement]:
-    """Every checkpoint of a truth file against the lines of its log."""
+    """The verdict on every checkpoint of a truth file."""
     truth = json.loads(truth_file.read_text(encoding="utf-8"))
     stamps, rows = [], []
     for line in lines_of(log, options):

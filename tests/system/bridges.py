@@ -1,6 +1,6 @@
-"""Other kinds of link between a fake autopilot and a gateway: what the autopilot's UDP socket says, on a stream.
+"""Bridges from the UDP socket of a fake autopilot to a serial port or a TCP connection of the gateway.
 
-A bridge can be cut and mended like a cable that is pulled, or a server that is killed and started again.
+A bridge can be cut and restored, like a cable that is unplugged or a server that is restarted.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ class Bridge(ABC):
         self._udp.bind(("127.0.0.1", 0))
         self._udp.setblocking(False)
         self.address: tuple[str, int] = self._udp.getsockname()
-        """Where the autopilot is to send."""
+        """The address to which the autopilot sends."""
         self._vehicle: tuple[str, int] | None = None
         self._stop = threading.Event()
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def start(self) -> None:
-        """Connect, and carry bytes from now on."""
+        """Connect, and start to carry bytes."""
         self.mend()
         self._thread.start()
 
     def cut(self) -> None:
-        """The stream ends, as if the cable were pulled or the server killed."""
+        """End the stream, as an unplugged cable or a killed server does."""
         with self._lock:
             self._close()
 
     def mend(self) -> None:
-        """The stream is there again, at the same place."""
+        """Open the stream again at the same place."""
         with self._lock:
             self._open()
 
     def close(self) -> None:
-        """The end."""
+        """Stop the thread and close everything."""
         self._stop.set()
         self._thread.join()
         self.cut()
@@ -53,19 +53,19 @@ class Bridge(ABC):
 
     @abstractmethod
     def _open(self) -> None:
-        """Make the stream."""
+        """Open the stream."""
 
     @abstractmethod
     def _close(self) -> None:
-        """End it, if there is one."""
+        """Close the stream if there is one."""
 
     @abstractmethod
     def _ends(self) -> list[int]:
-        """Descriptors on which something may come."""
+        """The descriptors from which to read."""
 
     @abstractmethod
     def _read(self, end: int) -> bytes:
-        """What has come on one end."""
+        """The bytes that wait at one descriptor."""
 
     @abstractmethod
     def _write(self, data: bytes) -> None:
@@ -92,7 +92,7 @@ class Bridge(ABC):
 
 
 class PtyBridge(Bridge):
-    """A serial device: a pseudo-terminal under a name that stays the same when it is plugged in again."""
+    """A serial device: a pseudo-terminal whose name stays the same after a reconnection."""
 
     def __init__(self, device: Path) -> None:
         super().__init__()
@@ -125,7 +125,7 @@ class PtyBridge(Bridge):
 
 
 class TcpServerBridge(Bridge):
-    """A simulator's TCP port: it serves one client."""
+    """The TCP port of a simulator, for one client."""
 
     def __init__(self) -> None:
         super().__init__()

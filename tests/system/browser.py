@@ -7,12 +7,23 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from ..deadline import SOON, Deadline, allow
+
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-dev-shm-usage",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
 )  # fmt: skip
-MISSING = next((f"{name} is not installed" for name in ("chromium", "chromedriver") if not shutil.which(name)), None)
-"""Why there can be no browser here."""
+MISSING = next(
+    (
+        f"{name} is not installed: apt-get install chromium chromium-driver"
+        for name in ("chromium", "chromedriver")
+        if not shutil.which(name)
+    ),
+    None,
+)
+"""The reason to skip the tests that need a browser."""
+
+SCRIPT = 5.0  # s that one script in the page waits
 
 
 class Browser:
@@ -28,7 +39,7 @@ class Browser:
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver: Any = webdriver.Chrome(options=options, service=Service(str(shutil.which("chromedriver"))))
-        self.driver.set_script_timeout(20)
+        self.driver.set_script_timeout(allow(20))
 
     def size(self, width: int, height: int) -> None:
         """As wide as a phone, or a screen."""
@@ -44,8 +55,8 @@ class Browser:
         """What a script returns."""
         return self.driver.execute_script(script, *arguments)
 
-    def wait(self, condition: str, seconds: float = 10.0) -> Any:
-        """Wait until a JavaScript expression is true; at which `performance.now()` it was, in seconds."""
+    def wait(self, condition: str, seconds: float = SOON) -> Any:
+        """Wait until a JavaScript expression is true; the Unix time of that, in seconds."""
         script = """
             const [condition, ms, done] = arguments;
             const test = new Function("return (" + condition + ")");
@@ -56,8 +67,9 @@ class Browser:
                 else setTimeout(look, 10);
             })();
         """
-        at = self.driver.execute_async_script(script, condition, seconds * 1000)
-        assert at is not None, f"not within {seconds} s: {condition}; the page says:\n{self.text()}"
+        deadline = Deadline(seconds)
+        while (at := self.driver.execute_async_script(script, condition, SCRIPT * 1000)) is None:
+            assert deadline.left, f"not true: {condition}; the page says:\n{self.text()}"
         return at
 
     def text(self, selector: str = "body") -> str:

@@ -1,4 +1,4 @@
-"""What the system tests share: gateways, wires and fake autopilots that are ended with the test."""
+"""Fixtures of the system tests: gateways, wires and fake autopilots that stop at the end of a test."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import jsonschema  # type: ignore[import-untyped]
 import pytest
 
 from mav_robot_status.clock import Instant, later
-from mav_robot_status.mavlink.pymavlink_dialect import MAVLink
 from mav_robot_status.testing import DEMO, FakeAutopilot, Scenario
 from mav_robot_status.testing.vehicle_model import VehicleModel
 
@@ -47,7 +46,7 @@ def autopilot(ended: contextlib.ExitStack) -> Callable[..., FakeAutopilot]:
 
 @pytest.fixture(scope="session")
 def validate() -> Callable[[Any], None]:
-    """Raise if a line is not as the schema that the package ships says."""
+    """Raises if a line does not match the schema of the package."""
     schema = json.loads((files("mav_robot_status") / "data" / "robot_status.schema.json").read_text("utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
     validator: Callable[[Any], None] = jsonschema.Draft202012Validator(schema).validate
@@ -55,22 +54,20 @@ def validate() -> Callable[[Any], None]:
 
 
 def record(scenario: Scenario, seconds: float) -> bytes:
-    """What a fake autopilot says within `seconds`, as a recorded log."""
+    """The messages of a fake autopilot within `seconds`, as a recorded log."""
     start = Instant(0.0, 1_800_000_000_000_000)
     model = VehicleModel(scenario, start.mono)
-    mav = MAVLink(None, srcSystem=1, srcComponent=1)
     log = b""
     for tick in range(round(seconds * 50)):
         now = later(start, tick / 50)
         for outgoing in model.run(now):
-            mav.seq = outgoing.seq
-            log += now.unix_us.to_bytes(8, "big") + outgoing.message.pack(mav)
+            log += now.unix_us.to_bytes(8, "big") + outgoing.frame()
     return log
 
 
 @pytest.fixture(scope="session")
 def demo_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demo's story as a recorded log."""
+    """The demo as a recorded log."""
     path = tmp_path_factory.mktemp("logs") / "demo.tlog"
     path.write_bytes(record(DEMO, DEMO.duration))
     return path

@@ -1,4 +1,4 @@
-"""The installed command as a process, its lines with the time of their arrival. Every wait has an end."""
+"""The installed command as a process, and its lines with their arrival times. Every wait has a deadline."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from datetime import datetime
 from typing import IO, Any, NamedTuple, TypeVar
+
+from ..deadline import SOON, Deadline, allow
 
 COMMAND = (sys.executable, "-m", "mav_robot_status.cli")
 T = TypeVar("T")
-
-SOON = 8.0
-"""Seconds that anything may take which should happen at once: generous, for a busy machine."""
 
 
 class Line(NamedTuple):
@@ -26,17 +26,23 @@ class Line(NamedTuple):
     """When it arrived: seconds on the monotonic clock."""
     status: dict[str, Any]
 
+    @property
+    def stamp(self) -> float:
+        """When the gateway made it: Unix seconds."""
+        return datetime.fromisoformat(self.status["stamp"].replace("Z", "+00:00")).timestamp()
+
 
 def run(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run the command to its end."""
-    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=30, check=False, **options)
+    command = [*COMMAND, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=allow(30), check=False, **options)
 
 
 class Gateway:
-    """A gateway that runs until `stop`, or until it ends by itself."""
+    """A gateway that runs until `stop` or until it ends by itself."""
 
     def __init__(self, *arguments: str, reads: bool = True) -> None:
-        """Start it; with `reads` false its standard output is a pipe that nobody reads."""
+        """Start it. With `reads` false nobody reads its standard output, which is a pipe."""
         self.lines: list[Line] = []
         self.log: list[str] = []
         self._news = threading.Condition()
@@ -64,7 +70,7 @@ class Gateway:
             found = [int(m[1]) for line in self.log if (m := re.search(r"listening on \S+:(\d+)/udp", line))]
             return found if len(found) >= count else None
 
-        return self._until(listening, SOON, f"{count} ports")
+        return self._until(listening, f"{count} ports")
 
     @property
     def address(self) -> tuple[str, int]:
@@ -72,32 +78,39 @@ class Gateway:
         return "127.0.0.1", self.port
 
     def wait_for(
-        self, wanted: Callable[[dict[str, Any]], bool], timeout: float = SOON, after: float = 0.0, what: str = ""
+        self, wanted: Callable[[dict[str, Any]], bool], after: float = 0.0, what: str = "line", seconds: float = SOON
     ) -> Line:
-        """The first line, arrived later than `after`, of which `wanted` is true."""
+        """The first line after the instant `after` for which `wanted` is true."""
 
         def found() -> Line | None:
             return next((line for line in self.lines if line.at > after and wanted(line.status)), None)
 
-        return self._until(found, timeout, what or "a line")
+        return self._until(found, what, seconds)
 
-    def wait_for_log(self, pattern: str, timeout: float = SOON) -> re.Match[str]:
+    def wait_for_lines(self, count: int, after: float = 0.0) -> Line:
+        """Line number `count` after the instant `after`."""
+        return self._until(lambda: [line for line in self.lines if line.at > after][count - 1 :], f"{count} lines")[0]
+
+    def wait_for_log(self, pattern: str) -> re.Match[str]:
         """The first match of `pattern` in the log."""
-        return self._until(
-            lambda: next((m for line in self.log if (m := re.search(pattern, line))), None), timeout, pattern
-        )
+        return self._until(lambda: next((m for line in self.log if (m := re.search(pattern, line))), None), pattern)
 
-    def wait_for_end(self, timeout: float = SOON) -> int:
+    def wait_for_end(self, seconds: float = SOON) -> int:
         """The exit code."""
-        code = self.process.wait(timeout)
+        code = self.process.wait(allow(seconds))
         for thread in self._threads:
-            thread.join(timeout)
+            thread.join(allow(seconds))
         return code
 
     def stop(self, number: signal.Signals = signal.SIGTERM) -> int:
         """End it with a signal; the exit code."""
         self.process.send_signal(number)
         return self.wait_for_end()
+
+    def state(self) -> str:
+        """The state of the process as in ps: R, S, T, ..."""
+        with open(f"/proc/{self.process.pid}/stat", encoding="ascii") as stat:
+            return stat.read().rpartition(")")[2].split()[0]
 
     def memory(self) -> float:
         """Resident memory in MB."""
@@ -111,26 +124,23 @@ class Gateway:
         return (int(fields[11]) + int(fields[12])) / 100
 
     def close(self) -> None:
-        """End it for sure."""
+        """Kill it if it still runs."""
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
         for thread in self._threads:
-            thread.join(SOON)
+            thread.join(allow(SOON))
         for pipe in (self.process.stdout, self.process.stderr):
             if pipe is not None:
                 pipe.close()
 
-    def _until(self, found: Callable[[], T | None], timeout: float, what: str) -> T:
-        deadline = time.monotonic() + timeout
+    def _until(self, found: Callable[[], T | None], what: str, seconds: float = SOON) -> T:
+        deadline = Deadline(seconds)
         with self._news:
             while not (result := found()):
-                left = deadline - time.monotonic()
-                if left <= 0:
-                    raise AssertionError(
-                        f"no {what} within {timeout} s; last lines {self.lines[-2:]}, log: " + "\n".join(self.log[-20:])
-                    )
-                self._news.wait(left)
+                log = "\n".join(self.log[-20:])
+                assert deadline.left, f"no {what}; last lines {self.lines[-2:]}, log: {log}"
+                self._news.wait(deadline.left)
         return result
 
     def _read(self, pipe: IO[bytes], take: Callable[[str], None]) -> None:

@@ -1,8 +1,9 @@
-"""mosquitto on a free port of the loopback, with what a test asks for: users, rights, TLS, a bridge to another."""
+"""mosquitto on a free loopback port, configured by the test: users, permissions, TLS, a bridge to another broker."""
 
 from __future__ import annotations
 
 import contextlib
+import itertools
 import shutil
 import socket
 import subprocess
@@ -15,11 +16,17 @@ from typing import Any, NamedTuple
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
-from .gateway_process import SOON
+from ..deadline import SOON, Deadline, allow, wait_until
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/sbin")
-MISSING = None if MOSQUITTO and shutil.which("openssl") else "mosquitto or openssl is not installed"
+MISSING = (
+    None
+    if MOSQUITTO and shutil.which("openssl")
+    else "mosquitto or openssl is not installed: apt-get install mosquitto openssl"
+)
 PREFIX = "plant/robots"
+SETTLE = "settle"
+_NUMBERS = itertools.count()
 
 
 def free_port() -> int:
@@ -29,10 +36,10 @@ def free_port() -> int:
 
 
 class Broker:
-    """One mosquitto; it may be stopped and started again on its port."""
+    """One mosquitto that a test can stop and start again on the same port."""
 
     def __init__(self, folder: Path, *lines: str, port: int | None = None, memory: bool = False) -> None:
-        """`memory`: what is retained outlives a restart."""
+        """With `memory`, retained messages survive a restart."""
         self.port = port or free_port()
         folder.mkdir(parents=True, exist_ok=True)
         self._conf = folder / f"mosquitto-{self.port}.conf"
@@ -60,18 +67,27 @@ class Broker:
     def start(self) -> None:
         assert MOSQUITTO is not None
         self.process = subprocess.Popen([MOSQUITTO, "-c", str(self._conf)], stderr=subprocess.DEVNULL)
-        deadline = time.monotonic() + SOON
-        while time.monotonic() < deadline:
-            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1):
-                return
-            time.sleep(0.02)
-        raise AssertionError(f"mosquitto does not start with {self._conf.read_text()}")
+        wait_until(self._accepts, what=f"mosquitto does not start with {self._conf.read_text()}")
+
+    def _accepts(self) -> bool:
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), allow(1)):
+            return True
+        return False
 
     def stop(self, kill: bool = False) -> None:
-        if self.process is not None:
-            (self.process.kill if kill else self.process.terminate)()
-            self.process.wait(SOON)
-            self.process = None
+        """Stop the broker. A mosquitto that is still starting loses a SIGTERM, so the signal is sent until it ends."""
+        if self.process is None:
+            return
+        process, self.process = self.process, None
+        end = process.kill if kill else process.terminate
+
+        def has_ended() -> bool:
+            end()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(1.0)
+            return process.returncode is not None
+
+        wait_until(has_ended)
 
     close = stop
 
@@ -87,13 +103,13 @@ class Heard(NamedTuple):
 
 
 class Listener:
-    """Hears everything below the prefix, and remembers it."""
+    """A client that remembers every publication below the prefix."""
 
     def __init__(self, port: int, prefix: str = PREFIX) -> None:
         self.heard: list[Heard] = []
         self._news = threading.Condition()
         self._prefix = prefix
-        self._client = Client(CallbackAPIVersion.VERSION2, "listener", clean_session=False)
+        self._client = Client(CallbackAPIVersion.VERSION2, f"listener-{next(_NUMBERS)}", clean_session=False)
         self._client.reconnect_delay_set(1, 1)
         self._client.on_message = self._take
         self._client.on_connect = self._subscribe
@@ -101,24 +117,29 @@ class Listener:
         self._client.on_subscribe = lambda *_: subscribed.set()
         self._client.connect("127.0.0.1", port, 5)
         self._client.loop_start()
-        assert subscribed.wait(SOON)
+        assert subscribed.wait(allow(SOON))
 
     def of(self, what: str, robot: str | None = None) -> list[Heard]:
         with self._news:
             return [h for h in self.heard if h.what == what and robot in (None, h.robot)]
 
-    def wait_for(self, wanted: Callable[[Heard], bool], timeout: float = SOON, after: float = 0.0) -> Heard:
-        found: Heard = self.wait(lambda: next((h for h in self.heard if h.at > after and wanted(h)), None), timeout)
+    def wait_for(self, wanted: Callable[[Heard], bool], seconds: float = SOON, after: float = 0.0) -> Heard:
+        found: Heard = self.wait(lambda: next((h for h in self.heard if h.at > after and wanted(h)), None), seconds)
         return found
 
-    def wait(self, found: Callable[[], Any], timeout: float = SOON) -> Any:
-        deadline = time.monotonic() + timeout
+    def wait(self, found: Callable[[], Any], seconds: float = SOON) -> Any:
+        deadline = Deadline(seconds)
         with self._news:
             while not (result := found()):
-                left = deadline - time.monotonic()
-                assert left > 0, f"not within {timeout} s; last heard: {self.heard[-3:]}"
-                self._news.wait(min(left, 0.5))
+                assert deadline.left, f"not within {allow(seconds):.0f} s; last heard: {self.heard[-3:]}"
+                self._news.wait(min(deadline.left, 0.5))
         return result
+
+    def settle(self) -> None:
+        """Wait until `heard` has everything that the broker has sent so far: it sends in order."""
+        mark = f"{time.monotonic()}"
+        self._client.publish(f"{self._prefix}/{SETTLE}", mark, 1)
+        self.wait_for(lambda h: (h.robot, h.text) == (SETTLE, mark))
 
     def close(self) -> None:
         self._client.disconnect()
@@ -136,7 +157,7 @@ class Listener:
 
 
 class Certificates:
-    """An authority, a server's certificate, one that has expired, a client's, and another authority."""
+    """An authority, a server's certificate, an expired one, a client's, and another authority."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -158,11 +179,11 @@ class Certificates:
         return str(self._folder / name)
 
     def lines(self, name: str = "server") -> tuple[str, ...]:
-        """What a broker's configuration says of them."""
+        """The lines of a broker's configuration that name them."""
         return f"certfile {self[f'{name}.pem']}", f"keyfile {self[f'{name}.key']}"
 
     def _openssl(self, *arguments: str) -> None:
-        subprocess.run(["openssl", *arguments], cwd=self._folder, capture_output=True, check=True, timeout=30)
+        subprocess.run(["openssl", *arguments], cwd=self._folder, capture_output=True, check=True, timeout=allow(30))
 
 
 _KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")

@@ -1,9 +1,9 @@
-"""A gateway that needs no vehicles: the `mqtt` publisher, fed with the statuses of many robots that change often.
+"""The `mqtt` publisher with made-up statuses of many robots that change often: a gateway without vehicles.
 
     python -m tests.system.mqtt_feeder --robots 500 --rate 1 --events 0.1 --seconds 60 mqtt://127.0.0.1:1883/robots
 
-Each robot has a status `rate` times a second, of which the share `events` differs from the one before. A line of
-JSON on standard output tells each change as soon as the publisher has taken it, the last one what it cost.
+Each robot has a status `rate` times a second. The share `events` of them differs from the status before. Standard
+output has one JSON line for each change, written when the publisher has taken it. The last line is the cost.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from mav_robot_status.interface import Detail, PublisherContext, RobotMode, Robo
 from mav_robot_status.publishers.mqtt.publisher import MqttPublisher
 
 
-class Nobody:
-    """Nobody hears MAVLink."""
+class NoMavlink:
+    """A MAVLink port without peers."""
 
     def audiences(self) -> list[object]:
         return []
@@ -34,10 +34,18 @@ class Nobody:
 
 
 def message(robot: int, changes: int, unix_us: int, heard: bool = True) -> RobotStatusMsg:
-    """A status; `changes` tells how often it has changed, and is its error code."""
+    """A status with the number of its changes as error code."""
     code = changes % 1000
     no = TriState.FALSE
-    status = RobotStatus(RobotMode.AUTO, no, no, no, no, TriState(bool(code)), code)
+    status = RobotStatus(
+        mode=RobotMode.AUTO,
+        e_stopped=no,
+        drives_powered=no,
+        motion_possible=no,
+        in_motion=no,
+        in_error=TriState(bool(code)),
+        error_code=code,
+    )
     return RobotStatusMsg(f"robot{robot}", unix_us, status, Detail(1 + robot % 250, 1), 0.1 if heard else None)
 
 
@@ -49,9 +57,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=1.0, help="statuses a second and robot")
     parser.add_argument("--events", type=float, default=0.1, help="share of the statuses that differ")
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument(
-        "--changes", type=int, default=0, help="after so many changes only wait until they are delivered"
-    )
+    parser.add_argument("--changes", type=int, default=0, help="after this many changes, wait until they are delivered")
     parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="of the publisher")
     parser.add_argument("--quiet", action="store_true", help="only the last line")
     asked = parser.parse_args()
@@ -59,7 +65,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
 
     options = {"url": asked.url, "robot": "{handle}", **dict(text.split("=", 1) for text in asked.option)}
-    publisher = MqttPublisher(PublisherContext(options, Nobody(), io.StringIO()))  # type: ignore[arg-type]
+    publisher = MqttPublisher(PublisherContext(options, NoMavlink(), io.StringIO()))  # type: ignore[arg-type]
     changes = [0] * asked.robots
     told_all = float("inf")
     told, spent = 0, 0.0

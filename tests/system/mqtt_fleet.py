@@ -1,11 +1,11 @@
-"""What many robots cost: starts mosquitto, gateways without vehicles and a board, and measures.
+"""The cost of many robots: starts mosquitto, gateways without vehicles and a board, and measures them.
 
     python -m tests.system.mqtt_fleet --robots 2000 --seconds 60
     python -m tests.system.mqtt_fleet --robots 1000 --brokers 2 --consumers 3
 
-With `--brokers` the gateways are spread over as many mosquittos, each with a bridge to a central one, to which the
-board listens. With `--consumers` as many share one subscription to the events there. Prints one JSON object: what each
-part used, and whether an event was lost or came twice.
+With `--brokers` the gateways publish to that many mosquittos. Each has a bridge to a central one, which the board
+reads. With `--consumers` that many clients share one subscription to the events there. Prints one JSON object: the
+processor time and memory of each part, and the lost and repeated events.
 """
 
 from __future__ import annotations
@@ -26,14 +26,16 @@ from typing import Any
 from paho.mqtt.client import Client, MQTTMessage, MQTTv5
 from paho.mqtt.enums import CallbackAPIVersion
 
-from .gateway_process import SOON, Gateway
+from ..deadline import SOON, allow, wait_until
+from .gateway_process import Gateway
 from .mqtt_broker import PREFIX, Broker, free_port
 
-SETTLE = 5.0  # s after which everybody is connected and measuring begins
+FOREVER = 1e6  # s: the gateways run until they are terminated
+CONNECTED = 60.0  # s on an idle machine until every robot is on the board
 
 
 def bridge(name: str, central: str) -> list[str]:
-    """What a site's mosquitto is told of the central one at `central`; docs/fleet.md shows it."""
+    """The configuration of a site's bridge to the central mosquitto at `central`; docs/how-to/fleet.md shows it."""
     return [
         f"connection {name}",
         f"address {central}",
@@ -47,7 +49,7 @@ def bridge(name: str, central: str) -> list[str]:
 
 
 class Consumer:
-    """One of several that share the events: remembers robot and `id` of each that it was given."""
+    """One of several clients that share the events: remembers robot and `id` of each event that it receives."""
 
     def __init__(self, number: int, port: int, group: str = "history") -> None:
         self.ids: list[tuple[str, str]] = []
@@ -58,7 +60,7 @@ class Consumer:
         self._client.connect("127.0.0.1", port, 10)
         self._client.subscribe(f"$share/{group}/{PREFIX}/+/events", 1)
         self._client.loop_start()
-        assert subscribed.wait(SOON)
+        assert subscribed.wait(allow(SOON))
 
     def close(self) -> None:
         self._client.disconnect()
@@ -82,9 +84,14 @@ def memory(pid: int) -> float:
 
 
 def vehicles(port: int) -> list[dict[str, Any]]:
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/vehicles", timeout=10) as answer:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/vehicles", timeout=allow(10)) as answer:
         found: list[dict[str, Any]] = json.load(answer)
         return found
+
+
+def live(port: int) -> list[dict[str, Any]]:
+    """The vehicles on the board whose link is CONNECTED."""
+    return [line for line in vehicles(port) if line["link"]["state"] == "CONNECTED"]
 
 
 def feeder(url: str, spool: Path, *arguments: str) -> subprocess.Popen[str]:
@@ -112,17 +119,17 @@ def measure(
         feeders = [
             feeder(
                 *(near[n % len(near)].url, folder / f"{n}.sqlite", "--quiet"),
-                *("--robots", str(share), "--first", str(n * share), "--seconds", str(seconds + SETTLE + 2)),
+                *("--robots", str(share), "--first", str(n * share), "--seconds", str(FOREVER)),
             )
             for n in range(gateways)
         ]
         for process in feeders:
             ended.callback(process.kill)
-        time.sleep(SETTLE)
+        wait_until(lambda: len(live(http)) == share * gateways, CONNECTED, "not every robot is on the board")
         started = {"board": board.process, "central": central.process} | {n: b.process for n, b in sites.items()}
         parts = {name: process.pid for name, process in started.items() if process is not None}
         before, start, ours = {name: cpu(pid) for name, pid in parts.items()}, time.monotonic(), time.process_time()
-        time.sleep(seconds)
+        time.sleep(seconds)  # the measurement
         passed, ours = time.monotonic() - start, time.process_time() - ours  # here only the consumers do anything
         used = {
             name: {
@@ -131,16 +138,18 @@ def measure(
             }
             for name, pid in parts.items()
         }
-        live = [line for line in vehicles(http) if line["link"]["state"] == "CONNECTED"]
+        connected = len(live(http))
+        for process in feeders:
+            process.terminate()
         costs = [json.loads(process.communicate()[0].splitlines()[-1]) for process in feeders]
-        time.sleep(1)
+        wait_until(lambda: not live(http), CONNECTED, "a robot's last message, OFFLINE, has not arrived")
         board.stop()
-        counted = re.search(r"(\d+) events, (\d+) again, (\d+) missing", board.log[-1])
+        counted = re.search(r"(\d+) events, (\d+) duplicates, (\d+) missing", board.log[-1])
         assert counted is not None, board.log
     told = sum(cost["told"] for cost in costs)
     return {
         "robots": share * gateways,
-        "live_on_the_board": len(live),
+        "live_on_the_board": connected,
         "board_cpu_percent": used["board"]["cpu_percent"],
         "board_memory_mb": used["board"]["memory_mb"],
         "brokers": {name: cost for name, cost in used.items() if name != "board"},
@@ -154,7 +163,7 @@ def measure(
 
 
 def _shared(readers: list[Consumer], told: int, percent: float) -> dict[str, Any]:
-    """How the consumers shared the events."""
+    """The events of each consumer."""
     ids = [ident for reader in readers for ident in reader.ids]
     return {
         "events": [len(reader.ids) for reader in readers],

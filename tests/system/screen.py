@@ -1,4 +1,4 @@
-"""The command on a terminal of its own: a pty with a terminal emulator behind it, which is read and typed to."""
+"""The command on its own terminal: a pseudo-terminal with a terminal emulator that the test reads and types to."""
 
 from __future__ import annotations
 
@@ -17,9 +17,13 @@ from typing import Any
 
 import pyte
 
-from .gateway_process import COMMAND, SOON
+from ..deadline import SOON, Deadline, allow
+from .gateway_process import COMMAND
 
 PLAIN_ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TMUX", "COLUMNS")}
+
+MARK = b"\0"
+"""Written to the terminal after the program has ended: everything before it is the program's."""
 
 
 class Screen:
@@ -38,11 +42,11 @@ class Screen:
         self.emulator = pyte.Screen(columns, lines)
         self._stream = pyte.ByteStream(self.emulator)
         self.raw = b""
-        """All that was written to the terminal."""
+        """Everything that was written to the terminal."""
         self._lock = threading.Lock()
         self._set_size(columns, lines)
         self.before = termios.tcgetattr(self.terminal)
-        self._stop = threading.Event()
+        self._stop, self._marked = threading.Event(), threading.Event()
         self.process = subprocess.Popen(
             [*command, *arguments],
             stdin=self.terminal,
@@ -57,7 +61,7 @@ class Screen:
 
     @property
     def text(self) -> list[str]:
-        """What is on the screen, line by line."""
+        """The lines on the screen."""
         with self._lock:
             return [line.rstrip() for line in self.emulator.display]
 
@@ -71,28 +75,29 @@ class Screen:
         os.write(self._master, keys.encode())
 
     def resize(self, columns: int, lines: int) -> None:
-        """Make the terminal another size, as a person does who drags its corner."""
+        """Resize the terminal, as a user does with the mouse."""
         with self._lock:
             self.emulator.resize(lines, columns)
         self._set_size(columns, lines)
 
-    def wait_for(self, wanted: Callable[[list[str]], Any], what: str, timeout: float = SOON) -> float:
-        """When `wanted` was true of the screen's lines: seconds on the monotonic clock."""
-        deadline = time.monotonic() + timeout
+    def wait_for(self, wanted: Callable[[list[str]], Any], what: str) -> float:
+        """The instant at which `wanted` was true for the lines on the screen: seconds on the monotonic clock."""
+        deadline = Deadline()
         while not wanted(self.text):
-            if time.monotonic() > deadline or self.process.poll() is not None:
-                raise AssertionError(f"no {what} within {timeout} s on the screen:\n" + "\n".join(self.text))
+            if self.process.poll() is not None or not deadline.left:
+                raise AssertionError(f"no {what} on the screen:\n" + "\n".join(self.text))
             time.sleep(0.01)
         return time.monotonic()
 
-    def wait_for_text(self, text: str, timeout: float = SOON) -> float:
-        """When the text was somewhere on the screen."""
-        return self.wait_for(lambda lines: any(text in line for line in lines), repr(text), timeout)
+    def wait_for_text(self, text: str) -> float:
+        """The instant at which the text was anywhere on the screen."""
+        return self.wait_for(lambda lines: any(text in line for line in lines), repr(text))
 
     def wait_for_end(self) -> int:
-        """The exit code."""
-        code = self.process.wait(SOON)
-        time.sleep(0.2)  # the thread reads what was written last
+        """The exit code; everything that the program wrote is in `raw`."""
+        code = self.process.wait(allow(SOON))
+        os.write(self.terminal, MARK)
+        assert self._marked.wait(allow(SOON)), "the terminal passes nothing on"
         return code
 
     def attributes(self) -> Any:
@@ -100,7 +105,7 @@ class Screen:
         return termios.tcgetattr(self.terminal)
 
     def close(self) -> None:
-        """End it for sure."""
+        """Kill the program if it still runs."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGKILL)
         self.process.wait()
@@ -115,7 +120,9 @@ class Screen:
     def _read(self) -> None:
         while not self._stop.is_set():
             if select.select([self._master], [], [], 0.02)[0]:
-                data = os.read(self._master, 65536)
+                data, mark, _ = os.read(self._master, 65536).partition(MARK)
                 with self._lock:
                     self.raw += data
                     self._stream.feed(data)
+                if mark:
+                    self._marked.set()

@@ -1,4 +1,4 @@
-"""Somebody else's program: what is typed into it, and what it prints. Every wait has an end."""
+"""A third party's program: the test types into it and waits for its output. Every wait has a deadline."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from ..deadline import Deadline, allow
+
 T = TypeVar("T")
 
 PATIENCE = 30.0
-"""Seconds for what a program does that we did not write, its start included, on a busy machine."""
+"""Seconds on an idle machine for a third party's program, including its start."""
 
 
 class Terminal:
@@ -19,14 +21,17 @@ class Terminal:
 
     def __init__(self, *command: str, **options: Any) -> None:
         """Start it; `options` are those of `subprocess.Popen`."""
-        self.text = ""
-        """What it has printed so far."""
-        self._news = threading.Condition()
+        self._pieces: list[str] = []
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options
         )
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
+
+    @property
+    def text(self) -> str:
+        """Its output so far."""
+        return "".join(self._pieces)
 
     def type(self, line: str) -> None:
         """Type a line."""
@@ -35,23 +40,21 @@ class Terminal:
         self.process.stdin.flush()
 
     def wait_for(self, found: Callable[[str], T], what: str) -> T:
-        """What `found` returns of the text, as soon as it is true."""
-        deadline = time.monotonic() + PATIENCE
-        with self._news:
-            while not (result := found(self.text)):
-                left = deadline - time.monotonic()
-                if left <= 0 or not self._thread.is_alive():
-                    raise AssertionError(f"no {what} in what {self.process.args!r} printed:\n{self.text[-3000:]}")
-                self._news.wait(left)
+        """The first true value that `found` returns for the output."""
+        deadline = Deadline(PATIENCE)
+        while not (result := found(self.text)):
+            if not self._thread.is_alive() or not deadline.left:
+                raise AssertionError(f"no {what} in the output of {self.process.args!r}:\n{self.text[-3000:]}")
+            time.sleep(0.1)  # tshark prints a lot, and a search of it takes time
         return result
 
     def close(self) -> None:
-        """End it for sure."""
+        """Terminate it, and kill it if that is not enough."""
         assert self.process.stdin is not None
-        self.process.stdin.close()  # or MAVProxy goes on waiting for a line
+        self.process.stdin.close()  # MAVProxy waits for a line until then
         self.process.terminate()
         try:
-            self.process.wait(5.0)
+            self.process.wait(allow(5.0))
         except subprocess.TimeoutExpired:
             self.process.kill()
         self.process.wait()
@@ -62,8 +65,4 @@ class Terminal:
     def _read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
-            with self._news:
-                self.text += line
-                self._news.notify_all()
-        with self._news:
-            self._news.notify_all()
+            self._pieces.append(line)

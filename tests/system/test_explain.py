@@ -1,4 +1,4 @@
-"""`explain` through the installed command: of real recordings the deciding evidence is named; a live one ends alone."""
+"""`explain` with the installed command: it names the deciding evidence, and ends by itself on a live link."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from typing import Any
 import pytest
 
 from mav_robot_status import cli
-from mav_robot_status.gateway.explain import FIELDS, LISTEN
+from mav_robot_status.diagnosis.explain import LISTEN
+from mav_robot_status.interface import STATES
 from mav_robot_status.mavlink.definitions import Heartbeat
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.testing import FakeAutopilot, ardurover
 
-from .gateway_process import SOON, Gateway, run
+from ..deadline import SOON
+from .gateway_process import Gateway, run
 
 ROOT = Path(__file__).parents[2]
 RECORDINGS = ROOT / "tests" / "recorded" / "logs"
@@ -167,7 +169,7 @@ def test_a_recording_is_explained_at_seconds_from_its_start_and_by_default_at_it
         ("+9999", "the log ends at 2026-11-20T19:11:34.876474Z"),
     ],
 )
-def test_a_moment_that_the_log_lacks_is_one_line_and_2(at: str, message: str) -> None:
+def test_a_time_outside_the_log_is_one_line_and_exit_code_2(at: str, message: str) -> None:
     done = run("explain", "-q", log("ardurover-4.5.6-auto"), "--at", at)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == f"mav-robot-status: --at {at}: {message}\n"
@@ -181,14 +183,14 @@ def test_a_moment_that_the_log_lacks_is_one_line_and_2(at: str, message: str) ->
         (("nowhere.tlog",), "cannot read the log"),
     ],
 )
-def test_a_wrong_question_is_one_line_and_2(arguments: tuple[str, ...], message: str) -> None:
+def test_wrong_arguments_are_one_line_and_exit_code_2(arguments: tuple[str, ...], message: str) -> None:
     done = run("explain", "-q", *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1
     assert message in done.stderr
 
 
-def test_a_log_without_an_autopilot_is_one_line_and_1(tmp_path: Path) -> None:
+def test_a_log_without_an_autopilot_is_one_line_and_exit_code_1(tmp_path: Path) -> None:
     path = tmp_path / "gcs.tlog"
     ground_station = encode(Heartbeat(0, 6, 8, 192, 4, 3), system=255, component=190, sequence=0)
     path.write_bytes((1_800_000_000_000_000).to_bytes(8, "big") + ground_station)
@@ -211,7 +213,7 @@ def test_a_live_vehicle_is_explained_and_the_command_ends_by_itself(
     (line,) = gate.lines
     assert line.status["vehicle"]["type"] == "GROUND_ROVER"
     assert line.status["link"]["state"] == "CONNECTED"
-    assert list(line.status["fields"]) == list(FIELDS)
+    assert list(line.status["fields"]) == [field.name for field in STATES]
     assert line.status["fields"]["drives_powered"]["rule"] == "disarmed"
     assert line.status["fields"]["in_error"]["rule"] == "no cause is active"
     assert not any("Traceback" in text for text in gate.log)
@@ -227,10 +229,10 @@ def signals() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("signals")
-def test_where_nothing_is_heard_it_is_one_line_and_1(
+def test_without_an_autopilot_it_is_one_line_and_exit_code_1(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("mav_robot_status.gateway.explain.PATIENCE", 0.1)
+    monkeypatch.setattr("mav_robot_status.diagnosis.explain.PATIENCE", 0.1)
     assert cli.main(["explain", "-q", "udpin:127.0.0.1:0"]) == 1
     out, err = capfd.readouterr()
     assert (out, err) == ("", "mav-robot-status: no autopilot was heard, so there is nothing to explain\n")
@@ -239,8 +241,8 @@ def test_where_nothing_is_heard_it_is_one_line_and_1(
 # -- the document ------------------------------------------------------------------------------------------------------
 
 
-def test_the_example_of_the_document_is_what_the_command_says() -> None:
-    text = (ROOT / "docs" / "explain.md").read_text("utf-8")
+def test_the_example_of_the_document_is_the_output_of_the_command() -> None:
+    text = (ROOT / "docs" / "how-to" / "explain.md").read_text("utf-8")
     command, *shown = text.partition("```text\n$ mav-robot-status ")[2].partition("```")[0].splitlines()
     assert shown
     done = run(*command.split(), "-q", cwd=ROOT)

@@ -1,4 +1,4 @@
-"""What a link does in the field, done to the installed command: its status goes on, and its memory stays flat."""
+"""Faults of links in the field: the status of the installed command continues, and its memory does not grow."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ from typing import Any
 
 import pytest
 
-from mav_robot_status.mavlink.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 from mav_robot_status.testing import FakeAutopilot, ardurover
+from tests.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 
+from ..deadline import in_time, wait_until
 from .bridges import Bridge, PtyBridge, TcpClientBridge, TcpServerBridge
 from .gateway_process import Gateway
 from .wire import Wire
 
 LOST, CONNECTED = "LOST", "CONNECTED"
 GROWTH = 5.0  # MB
+FLOOD = 200_000  # frames
+STOPPED = 5.0  # s, longer than heartbeat_timeout
 HOUR = timedelta(hours=1)
 
 StartGateway = Callable[..., Gateway]
@@ -36,7 +39,7 @@ OpenWire = Callable[..., Wire]
 
 @pytest.fixture
 def bridge(ended: contextlib.ExitStack) -> Callable[[Bridge], Bridge]:
-    """Start a bridge that is ended with the test."""
+    """Start a bridge that the end of the test closes."""
 
     def start(made: Bridge) -> Bridge:
         made.start()
@@ -59,7 +62,7 @@ def state(name: str) -> Callable[[dict[str, object]], bool]:
 
 
 def goes_on_after_a_cut(gate: Gateway, cable: Bridge, autopilot: StartAutopilot) -> None:
-    """The story of every cut: connected, cut, honestly lost, mended, connected, and right about what is new."""
+    """Connected, cut, LOST with UNKNOWN fields, restored, connected with the present state."""
     rover = autopilot(ardurover.READY, cable.address)
     gate.wait_for(lambda s: s["drives_powered"] is False, what="a status")
     cable.cut()
@@ -68,7 +71,7 @@ def goes_on_after_a_cut(gate: Gateway, cable: Bridge, autopilot: StartAutopilot)
     assert lost.status["drives_powered"] is None
     rover.arm()
     cable.mend()
-    back = gate.wait_for(state(CONNECTED), after=lost.at, timeout=15, what="the return")
+    back = gate.wait_for(state(CONNECTED), after=lost.at, what="the return", seconds=15)
     assert back.status["drives_powered"] is True
     assert gate.process.poll() is None
 
@@ -84,7 +87,7 @@ def test_a_serial_device_that_is_unplugged_and_plugged_in_again(
     assert any("vehicle 1.1 was lost once" in line for line in gate.log)
 
 
-def test_a_serial_device_that_comes_after_the_start(
+def test_a_serial_device_that_appears_after_the_start(
     gateway: StartGateway, autopilot: StartAutopilot, bridge: Callable[[Bridge], Bridge], tmp_path: Path
 ) -> None:
     device = tmp_path / "ttyACM0"
@@ -107,7 +110,7 @@ def test_a_tcp_server_that_is_killed_and_started_again(
     assert gate.stop() == 0
 
 
-def test_a_tcp_client_that_goes_and_comes_back(
+def test_a_tcp_client_that_disconnects_and_reconnects(
     gateway: StartGateway, autopilot: StartAutopilot, bridge: Callable[[Bridge], Bridge]
 ) -> None:
     with socket.socket() as free:
@@ -155,7 +158,7 @@ def test_datagrams_truncated_duplicated_and_out_of_order(gateway: StartGateway, 
     assert gate.stop() == 0
 
 
-def test_a_hundred_megabytes_of_random_bytes_leave_the_memory_flat(gateway: StartGateway) -> None:
+def test_memory_does_not_grow_with_a_hundred_megabytes_of_random_bytes(gateway: StartGateway) -> None:
     noise = random.Random(5).randbytes(1 << 20)
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
@@ -173,7 +176,7 @@ def test_a_hundred_megabytes_of_random_bytes_leave_the_memory_flat(gateway: Star
             sent = time.monotonic()
             heartbeat = MAVLink_heartbeat_message(10, 3, 65 | 128, 0, 4, 3)
             client.sendall(bytes(300) + heartbeat.pack(mav))
-            gate.wait_for(lambda s: s["drives_powered"] is True, after=sent, timeout=30)
+            gate.wait_for(lambda s: s["drives_powered"] is True, after=sent, seconds=30)
             assert gate.memory() - before < GROWTH
     assert gate.stop() == 0
     assert any("bytes of garbage" in line for line in gate.log)
@@ -207,16 +210,18 @@ def test_a_flood_from_a_stranger_neither_hides_the_vehicle_nor_makes_it_grow(
     thread.start()
     try:
         rover.wait_for("ROBOT_STATUS", lambda m: m.subject_system == 77)  # it is a vehicle for all we know
+        wait_until(lambda: count >= FLOOD / 2)
         before = gate.memory()
         for armed in (True, False, True):
             sent = rover.beat(armed=armed)
             rover.wait_for("ROBOT_STATUS", about_system_1(armed), after=sent)
-        rover.wait_for("HEARTBEAT", after=started + 4.0)
+        wait_until(lambda: count >= FLOOD)
+        rover.wait_for("HEARTBEAT", after=time.monotonic())
         assert gate.memory() - before < GROWTH
     finally:
         stop.set()
         thread.join()
-    assert count / (time.monotonic() - started) > 40_000
+    assert in_time(time.monotonic() - started, count / 40_000)
     assert gate.stop() == 0
 
 
@@ -247,7 +252,7 @@ STEPPED = """
 
 @pytest.fixture
 def offset_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The seconds by which the wall clock of the command is wrong: its Python loads this at its start."""
+    """The error of the command's wall clock in seconds. Its Python loads the file at its start."""
     (tmp_path / "sitecustomize.py").write_text(textwrap.dedent(STEPPED))
     offset = tmp_path / "offset"
     monkeypatch.setenv("OFFSET_FILE", str(offset))
@@ -266,16 +271,16 @@ def test_a_clock_that_is_stepped_by_hours_changes_stamps_and_nothing_else(
         offset_file.write_text(str(hours * 3600))
         shown = datetime.fromtimestamp(time.time() + hours * 3600, timezone.utc)
         stepped = gate.wait_for(stamped_in(f"{shown:%Y-%m-%dT%H}", f"{shown + HOUR:%Y-%m-%dT%H}"))
-        gate.wait_for(lambda s: True, after=stepped.at + 4.0)  # longer than a link may be silent
+        gate.wait_for_lines(20, after=stepped.at)
     arrivals = [line.at for line in gate.lines]
-    assert max(b - a for a, b in itertools.pairwise(arrivals)) < 1.0
+    assert in_time(max(b - a for a, b in itertools.pairwise(arrivals)), 1.0)
     assert not any(line.status["link"]["state"] == LOST for line in gate.lines)
     sent = rover.beat(armed=True)
     gate.wait_for(lambda s: s["drives_powered"] is True, after=sent)
     assert gate.stop() == 0
 
 
-def test_a_process_that_was_stopped_for_ten_seconds_goes_on_with_what_is_so_now(
+def test_a_process_that_was_stopped_for_seconds_continues_with_the_present(
     gateway: StartGateway, wire: OpenWire
 ) -> None:
     gate = gateway("udpin:127.0.0.1:0")
@@ -284,11 +289,11 @@ def test_a_process_that_was_stopped_for_ten_seconds_goes_on_with_what_is_so_now(
     gate.process.send_signal(signal.SIGSTOP)
     stopped = time.monotonic()
     rover.armed = True
-    while len(rover.beats) < 2 or rover.beats[-1] < stopped + 10.0:
-        time.sleep(0.1)
-    resumed = time.monotonic()
+    wait_until(lambda: rover.beats[-1] > stopped + STOPPED)
+    resumed, resumed_unix = time.monotonic(), time.time()
     os.kill(gate.process.pid, signal.SIGCONT)
     gate.wait_for(lambda s: s["drives_powered"] is True, after=resumed)
-    late = [line for line in gate.lines if resumed < line.at < resumed + 1.0]
-    assert len(late) < 40  # the lines that fell due meanwhile are not made up for
+    gate.wait_for_lines(12, after=resumed)
+    first_second = [line for line in gate.lines if line.at > resumed and line.stamp < resumed_unix + 1.0]
+    assert len(first_second) < 30  # the gateway does not catch up on the lines of the pause, 10 a second
     assert gate.stop() == 0

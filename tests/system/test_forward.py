@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from mav_robot_status.mavlink.pymavlink_dialect import MAVLink_command_long_message, MAVLink_heartbeat_message
 from mav_robot_status.testing import FakeAutopilot, ardurover
+from tests.pymavlink_dialect import MAVLink_command_long_message, MAVLink_heartbeat_message
 
 from .gateway_process import Gateway
 from .wire import Wire
@@ -19,7 +19,7 @@ StartGateway = Callable[..., Gateway]
 OpenWire = Callable[..., Wire]
 
 
-def station(wire: OpenWire, gate: Gateway) -> Wire:
+def endpoint(wire: OpenWire, gate: Gateway) -> Wire:
     """A ground station on the gateway's second port."""
     ground = wire(("127.0.0.1", gate.ports(2)[1]), system=255, component=190)
     ground.send(MAVLink_heartbeat_message(GCS, INVALID, 0, 0, 4, 3))
@@ -30,7 +30,7 @@ def test_a_ground_station_hears_the_vehicle_and_the_status_and_commands_it_throu
     gateway: StartGateway, wire: OpenWire, autopilot: Callable[..., FakeAutopilot]
 ) -> None:
     gate = gateway("udpin:127.0.0.1:0", "--out", "udpin:127.0.0.1:0", "--forward")
-    ground = station(wire, gate)
+    ground = endpoint(wire, gate)
     rover = autopilot(ardurover.READY, gate.address)
     beat = ground.wait_for("HEARTBEAT", lambda m: m.get_srcComponent() == 1)
     assert beat.message.type == 10
@@ -43,9 +43,9 @@ def test_a_ground_station_hears_the_vehicle_and_the_status_and_commands_it_throu
     assert gate.stop() == 0
 
 
-def test_datagrams_pass_untouched_also_with_kinds_that_we_do_not_know(gateway: StartGateway, wire: OpenWire) -> None:
+def test_datagrams_are_forwarded_unchanged_even_with_unknown_messages(gateway: StartGateway, wire: OpenWire) -> None:
     gate = gateway("udpin:127.0.0.1:0", "--out", "udpin:127.0.0.1:0", "--forward")
-    ground = station(wire, gate)
+    ground = endpoint(wire, gate)
     rover = wire(gate.address).beating()
     ground.wait_for("HEARTBEAT", lambda m: m.get_srcComponent() == 1)
     frame = MAVLink_heartbeat_message(10, 3, 65, 77, 4, 3).pack(rover.mav)
@@ -59,11 +59,11 @@ def of_the_autopilot(system: int) -> Callable[[Any], bool]:
     return lambda message: (message.get_srcSystem(), message.get_srcComponent()) == (system, 1)
 
 
-def test_a_command_goes_only_where_its_target_was_heard_and_nothing_comes_back(
+def test_a_command_goes_only_to_the_link_of_its_target_and_nothing_returns_to_its_sender(
     gateway: StartGateway, wire: OpenWire
 ) -> None:
     gate = gateway("udpin:127.0.0.1:0", "--out", "udpin:127.0.0.1:0", "--forward")
-    ground = station(wire, gate)
+    ground = endpoint(wire, gate)
     one, two = wire(gate.address, system=1).beating(), wire(gate.address, system=2).beating()
     for system in (1, 2):
         ground.wait_for("HEARTBEAT", of_the_autopilot(system))
@@ -77,9 +77,9 @@ def test_a_command_goes_only_where_its_target_was_heard_and_nothing_comes_back(
     assert gate.stop() == 0
 
 
-def test_without_the_option_nothing_is_passed_on(gateway: StartGateway, wire: OpenWire) -> None:
+def test_without_the_option_nothing_is_forwarded(gateway: StartGateway, wire: OpenWire) -> None:
     gate = gateway("udpin:127.0.0.1:0", "--out", "udpin:127.0.0.1:0")
-    ground = station(wire, gate)
+    ground = endpoint(wire, gate)
     wire(gate.address).beating()
     ground.wait_for("ROBOT_STATUS")
     ground.wait_for("NAMED_VALUE_INT")

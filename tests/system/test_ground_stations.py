@@ -1,12 +1,13 @@
-"""MAVProxy and Wireshark's tshark see ROBOT_STATUS as docs/ground-stations.md shows.
+"""MAVProxy and Wireshark's tshark see ROBOT_STATUS as docs/how-to/ground-stations.md shows.
 
-What is typed into them and what they print is taken from that page. A tool that is not on this machine is skipped;
-.ci/run installs both.
+The tests type what that page shows and expect the output that it shows. Without a tool its tests are skipped; .ci/run
+installs both.
 """
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import re
 import shlex
@@ -20,19 +21,20 @@ from typing import Any
 
 import pytest
 
-from mav_robot_status.mavlink.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 from mav_robot_status.testing import FakeAutopilot, ardurover
+from tests.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 
+from ..deadline import allow
 from ..docs.documents import ROOT, blocks
 from .gateway_process import Gateway, run
 from .terminal import Terminal
 from .wire import Wire
 
 MAVPROXY = Path(os.environ.get("MAVPROXY_VENV", ROOT / "build" / "mavproxy"))
-"""An environment of its own: pymavlink's dialects in it are written to."""
+"""A separate environment, because the tests add dialects to its pymavlink."""
 
 TELLING = ardurover.READY._replace(streams={1: 4.0, 245: 4.0, 33: 10.0, 30: 10.0, 2: 2.0, 36: 10.0, 74: 10.0})
-"""A rover whose messages come by themselves, so that its status is complete at once."""
+"""A rover that sends everything unasked, so that its status is complete at once."""
 
 LINKTYPE_RAW = 101
 
@@ -52,21 +54,40 @@ def free_port() -> int:
 # -- MAVProxy --------------------------------------------------------------------------------------------------------
 
 
+DIALECTS = "mav_robot_status", "everything"
+GENERATE = "import sys; from pymavlink.mavutil import set_dialect; [set_dialect(name) for name in sys.argv[1:]]"
+
+
 @pytest.fixture(scope="module")
-def dialects() -> Path:
-    """Where MAVProxy's pymavlink has its dialects, ours among them."""
+def dialects(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Our dialects are in MAVProxy's pymavlink. They are generated once, while the other test processes wait."""
     folder = next(MAVPROXY.glob("lib/python*/site-packages/pymavlink/dialects/v20"), None)
     if folder is None or not (MAVPROXY / "bin" / "mavproxy.py").exists():
-        pytest.skip(f"MAVProxy is not installed in {MAVPROXY}; .ci/run does it where there is a network")
-    assert run("dialect", "-o", str(folder)).returncode == 0
-    (folder / "everything.xml").write_text(shown("<mavlink>"))
-    for module in ("mav_robot_status.py", "everything.py"):
-        (folder / module).unlink(missing_ok=True)
-    return folder
+        pytest.skip(f"MAVProxy is not installed in {MAVPROXY}: .ci/run installs it from the network")
+    wanted = tmp_path_factory.mktemp("dialects")
+    assert run("dialect", "-o", str(wanted)).returncode == 0
+    (wanted / "everything.xml").write_text(shown("<mavlink>"))
+    definitions = "".join((wanted / f"{name}.xml").read_text() for name in DIALECTS)
+    with open(folder / "generated.txt", "a+") as generated:
+        fcntl.flock(generated, fcntl.LOCK_EX)
+        generated.seek(0)
+        if generated.read() != definitions:
+            _generate(wanted, folder)
+            generated.truncate(0)
+            generated.write(definitions)
+
+
+def _generate(wanted: Path, folder: Path) -> None:
+    for name in DIALECTS:
+        shutil.copy(wanted / f"{name}.xml", folder)
+        (folder / f"{name}.py").unlink(missing_ok=True)
+    command = [str(MAVPROXY / "bin" / "python"), "-c", GENERATE, *DIALECTS]
+    environment = {**os.environ, "MAVLINK20": "1"}
+    subprocess.run(command, check=True, capture_output=True, timeout=allow(60), env=environment)
 
 
 @pytest.fixture
-def mavproxy(ended: contextlib.ExitStack, dialects: Path, tmp_path: Path) -> Callable[[str, int], Terminal]:
+def mavproxy(ended: contextlib.ExitStack, dialects: None, tmp_path: Path) -> Callable[[str, int], Terminal]:
     """Start MAVProxy with a dialect, its master listening on a port."""
     command = MAVPROXY / "bin" / "python", "-u", MAVPROXY / "bin" / "mavproxy.py", "--no-state"
     environment = {**os.environ, "HOME": str(tmp_path)}
@@ -85,7 +106,7 @@ def timeless(text: str) -> str:
     return re.sub(r"(time_\w+) : \d+", r"\1 : 0", text)
 
 
-def test_mavproxy_that_has_the_vehicle_sees_the_status_that_the_gateway_sends_back(
+def test_mavproxy_with_the_vehicle_shows_the_status_that_the_gateway_sends_back(
     gateway: Callable[..., Gateway],
     autopilot: Callable[..., FakeAutopilot],
     mavproxy: Callable[[str, int], Terminal],
@@ -108,7 +129,7 @@ def test_mavproxy_that_has_the_vehicle_sees_the_status_that_the_gateway_sends_ba
     [("mav_robot_status", "ROBOT_STATUS"), ("all", "NAMED_VALUE_INT")],
     ids=["with our dialect", "with its own"],
 )
-def test_mavproxy_on_an_out_sees_what_its_dialect_knows(
+def test_mavproxy_on_an_out_shows_the_messages_of_its_dialect(
     dialect: str,
     watched: str,
     gateway: Callable[..., Gateway],
@@ -132,7 +153,7 @@ def test_mavproxy_on_an_out_sees_what_its_dialect_knows(
 def wireshark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with our dissector in `dialect`; Wireshark has no other plugins and settings."""
     if shutil.which("tshark") is None:
-        pytest.skip("tshark is not installed; .ci/run does it where it is root")
+        pytest.skip("tshark is not installed: apt-get install tshark")
     monkeypatch.setenv("WIRESHARK_CONFIG_DIR", str(tmp_path / "settings"))
     assert run("dialect", "-o", str(tmp_path / "dialect")).returncode == 0
     return tmp_path
@@ -142,7 +163,7 @@ def wireshark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 FRAMES_FIRST = ("-o", "udp.try_heuristic_first:TRUE")
 
 
-def test_tshark_shows_a_status_as_it_passes(
+def test_tshark_shows_a_captured_status(
     gateway: Callable[..., Gateway],
     autopilot: Callable[..., FakeAutopilot],
     wire: Callable[..., Wire],
@@ -158,12 +179,12 @@ def test_tshark_shows_a_status_as_it_passes(
         pytest.skip(f"tshark may not capture here: {tshark.text.splitlines()[-1:]}")
     gate = gateway("udpin:127.0.0.1:0", "--out", f"udpout:127.0.0.1:{port}")
     autopilot(TELLING, gate.address)
-    pieces = [re.escape(piece.strip("\n")) for piece in "\n".join(printed).split("...\n")]
+    pieces = [re.escape(piece.strip("\n")) for piece in "\n".join(printed).split("...\n") if piece]
     status = re.compile(r"(?:(?!^Frame )[\s\S])*?".join(pieces), re.MULTILINE)
     tshark.wait_for(status.search, "status as the page shows it")
 
 
-def test_tshark_reads_every_field_on_any_port_and_leaves_alone_what_is_not_mavlink(
+def test_tshark_dissects_every_field_on_any_port_and_ignores_other_data(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire], wireshark: Path
 ) -> None:
     out = wire()
@@ -178,12 +199,12 @@ def test_tshark_reads_every_field_on_any_port_and_leaves_alone_what_is_not_mavli
     datagrams += [older + statuses[0].data + older, statuses[0].data + b"more", statuses[0].data[:-1], b"\xfd\x01", b""]
     (wireshark / "traffic.pcap").write_bytes(pcap(datagrams))
 
-    names = statuses[0].message.get_fieldnames()
+    names = [name for name in statuses[0].message.to_dict() if name != "mavpackettype"]
     columns = [part for name in names for part in ("-e", f"mavlink_proto.ROBOT_STATUS_{name}")]
     command = "tshark -r traffic.pcap -X lua_script:dialect/mav_robot_status.lua -Y mavlink_proto -T fields".split()
     rows = subprocess.run(
         [*command, *FRAMES_FIRST, "-e", "_ws.col.Info", *columns],
-        cwd=wireshark, capture_output=True, text=True, timeout=30, check=True,
+        cwd=wireshark, capture_output=True, text=True, timeout=allow(30), check=True,
     ).stdout.splitlines()  # fmt: skip
 
     def row(info: str, message: Any) -> list[str | int]:

@@ -1,4 +1,4 @@
-"""What a network may send: nothing of it disturbs the gateway or makes it grow."""
+"""Hostile input from the network: it neither disturbs the gateway nor makes it grow."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import socket
 import time
 from collections.abc import Callable
 
-from mav_robot_status.mavlink.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
+from tests.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 
 from .gateway_process import Gateway
 from .wire import Wire
@@ -34,7 +34,7 @@ def test_random_datagrams_do_not_disturb(gateway: Callable[..., Gateway], wire: 
     assert any("bytes of garbage" in line for line in gate.log)
 
 
-def test_a_thousand_senders_and_every_id_do_not_make_it_grow_without_end(
+def test_memory_is_bounded_for_a_thousand_senders_and_every_id(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire]
 ) -> None:
     gate = gateway("udpin:127.0.0.1:0", "--json", "none")
@@ -51,10 +51,10 @@ def test_a_thousand_senders_and_every_id_do_not_make_it_grow_without_end(
     assert gate.stop() == 0
 
 
-def test_an_idle_gateway_does_not_use_the_processor(gateway: Callable[..., Gateway], wire: Callable[..., Wire]) -> None:
+def test_an_idle_gateway_uses_little_processor_time(gateway: Callable[..., Gateway], wire: Callable[..., Wire]) -> None:
     gate = gateway("udpin:127.0.0.1:0")
     rover = wire(gate.address).beating()
     gate.wait_for(lambda s: s["drives_powered"] is False)
     before, since = gate.cpu(), time.monotonic()
-    rover.wait_for("HEARTBEAT", after=since + 2.0)
+    rover.wait_for("HEARTBEAT", after=since, count=3)
     assert (gate.cpu() - before) / (time.monotonic() - since) < 0.2

@@ -1,4 +1,4 @@
-"""`/metrics` of the installed command: Prometheus' own tools read it, and a Prometheus of Debian's scrapes it."""
+"""`/metrics` of the installed command, read by promtool and by a real Prometheus."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ from typing import Any
 
 import pytest
 
-from mav_robot_status.mavlink.pymavlink_dialect import MAVLink_statustext_message
 from mav_robot_status.publishers.metrics import CONNECTION, CONTENT_TYPE, GATEWAY, PREFIX, PUBLISHER, VEHICLE
+from tests.pymavlink_dialect import MAVLink_statustext_message
 
-from .gateway_process import SOON, Gateway
+from ..deadline import SOON, Deadline, allow, in_time
+from .gateway_process import Gateway
 from .wire import Wire
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -30,8 +31,9 @@ CONTRIB = ROOT / "contrib"
 FAMILIES = {PREFIX + family.name for family in (*GATEWAY, *VEHICLE, *CONNECTION, *PUBLISHER)}
 PATH = f"{ROOT / 'build' / 'prometheus' / 'usr' / 'bin'}:{os.environ['PATH']}"
 PROMTOOL, PROMETHEUS = (shutil.which(name, path=PATH) or "" for name in ("promtool", "prometheus"))
-needs_promtool = pytest.mark.skipif(not PROMTOOL, reason="promtool is not installed")
-needs_prometheus = pytest.mark.skipif(not PROMETHEUS, reason="prometheus is not installed")
+GET = "is not installed: apt-get install prometheus, or .ci/run unpacks it in build/prometheus"
+needs_promtool = pytest.mark.skipif(not PROMTOOL, reason=f"promtool {GET}")
+needs_prometheus = pytest.mark.skipif(not PROMETHEUS, reason=f"prometheus {GET}")
 PAGE = ("udpin:127.0.0.1:0", "--json", "none", "--http", "127.0.0.1:0")
 
 StartGateway = Callable[..., Gateway]
@@ -39,7 +41,7 @@ OpenWire = Callable[..., Wire]
 
 
 def promtool(*arguments: str, given: str | None = None) -> None:
-    done = subprocess.run([PROMTOOL, *arguments], input=given, capture_output=True, text=True, timeout=30)
+    done = subprocess.run([PROMTOOL, *arguments], input=given, capture_output=True, text=True, timeout=allow(30))
     assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
 
 
@@ -49,22 +51,22 @@ def address(gate: Gateway) -> str:
 
 def scrape(gate: Gateway, **headers: str) -> str:
     asked = urllib.request.Request(f"{address(gate)}/metrics", headers=headers)
-    with urllib.request.urlopen(asked, timeout=SOON) as answer:
+    with urllib.request.urlopen(asked, timeout=allow(SOON)) as answer:
         assert answer.headers["Content-Type"] == CONTENT_TYPE
         return str(answer.read().decode())
 
 
 def until(gate: Gateway, pattern: str) -> str:
-    """The text once it has a line that matches."""
-    deadline = time.monotonic() + SOON
+    """The metrics as soon as a line matches."""
+    deadline = Deadline()
     while not re.search(pattern, text := scrape(gate), re.MULTILINE):
-        assert time.monotonic() < deadline, text
+        assert deadline.left, text
         time.sleep(0.05)
     return text
 
 
 def in_error(wire: OpenWire, gate: Gateway) -> Wire:
-    """A rover that drives, and then has crashed."""
+    """A rover that drives and then crashes."""
     rover = wire(gate.address)
     rover.beat(armed=True, custom_mode=10)
     rover.beating()
@@ -76,7 +78,7 @@ def in_error(wire: OpenWire, gate: Gateway) -> Wire:
 
 
 @needs_promtool
-def test_the_alerts_are_rules_and_do_what_their_tests_say(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_alerts_are_valid_and_pass_their_tests(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(CONTRIB / "prometheus")
     promtool("check", "rules", "alerts.yml")
     promtool("test", "rules", "alerts_test.yml")
@@ -102,12 +104,12 @@ def expressions() -> list[str]:
     return found
 
 
-def test_dashboard_and_alerts_ask_only_for_what_there_is() -> None:
+def test_dashboard_and_alerts_use_existing_metrics_only() -> None:
     asked = " ".join(expressions()) + (CONTRIB / "prometheus" / "alerts.yml").read_text()
     assert set(re.findall(rf"{PREFIX}\w+", asked)) <= FAMILIES
 
 
-def test_the_panels_of_the_dashboard_do_not_cover_one_another() -> None:
+def test_the_panels_of_the_dashboard_do_not_overlap() -> None:
     taken: set[tuple[int, int]] = set()
     for panel in dashboard()["panels"]:
         at = panel["gridPos"]
@@ -130,13 +132,14 @@ def test_the_metrics_follow_a_vehicle_through_an_error_and_a_loss(gateway: Start
         assert PREFIX + line.format(labels) in text.splitlines()
     age = re.search(r"^mav_robot_status_heartbeat_age_seconds\S+ (\S+)$", text, re.MULTILINE)
     assert age
-    assert 0 <= float(age[1]) < 1
+    assert float(age[1]) >= 0
+    assert in_time(float(age[1]), 1)
     rover.beating(False)
     text = until(gate, r"^mav_robot_status_link_up\S+ 0$")
     assert re.search(r"^mav_robot_status_drives_powered\S+ -1$", text, re.MULTILINE)
 
 
-def test_what_is_damaged_on_a_connection_is_counted_by_message(gateway: StartGateway, wire: OpenWire) -> None:
+def test_damaged_frames_are_counted_by_message(gateway: StartGateway, wire: OpenWire) -> None:
     gate = gateway(*PAGE)
     rover = wire(gate.address)
     rover.beat()
@@ -151,13 +154,13 @@ def test_what_is_damaged_on_a_connection_is_counted_by_message(gateway: StartGat
     until(gate, rf"^mav_robot_status_connection_frames_total{series}\}} 2$")
 
 
-def test_a_reader_of_json_lines_that_does_not_read_shows_as_drops(gateway: StartGateway, wire: OpenWire) -> None:
+def test_a_reader_of_json_lines_that_does_not_read_causes_counted_drops(gateway: StartGateway, wire: OpenWire) -> None:
     gate = gateway("udpin:127.0.0.1:0", "--rate", "1000", "--http", "127.0.0.1:0", reads=False)
     wire(gate.address).beating()
     until(gate, r'^mav_robot_status_publisher_dropped_messages_total\{publisher="json",number="1"\} [1-9]')
 
 
-def test_who_does_not_show_the_token_gets_no_metrics(gateway: StartGateway, tmp_path: pathlib.Path) -> None:
+def test_without_the_token_there_are_no_metrics(gateway: StartGateway, tmp_path: pathlib.Path) -> None:
     token = tmp_path / "token"
     token.write_text("0123456789abcdef\n")
     token.chmod(0o600)
@@ -175,7 +178,7 @@ def test_a_demo_has_metrics_too(gateway: StartGateway) -> None:
 
 
 @needs_promtool
-def test_promtool_finds_nothing_to_say_about_the_metrics(gateway: StartGateway, wire: OpenWire) -> None:
+def test_promtool_accepts_the_metrics(gateway: StartGateway, wire: OpenWire) -> None:
     gate = gateway(*PAGE)
     in_error(wire, gate)
     promtool("check", "metrics", given=until(gate, "^mav_robot_status_error{"))
@@ -185,7 +188,7 @@ def test_promtool_finds_nothing_to_say_about_the_metrics(gateway: StartGateway, 
 
 
 class Prometheus:
-    """A Prometheus by the configuration that is shipped, faster."""
+    """A Prometheus with the shipped configuration and shorter intervals."""
 
     def __init__(self, folder: pathlib.Path, target: str) -> None:
         config = (CONTRIB / "prometheus" / "prometheus.yml").read_text()
@@ -202,13 +205,13 @@ class Prometheus:
             )
 
     def ask(self, query: str) -> list[Any]:
-        """The series of an expression, now. Raises HTTPError for one that is none."""
+        """The series of an expression now. Raises HTTPError if it is not an expression."""
         url = f"http://{self.address}/api/v1/query?{urllib.parse.urlencode({'query': query})}"
-        with urllib.request.urlopen(url, timeout=SOON) as answer:
+        with urllib.request.urlopen(url, timeout=allow(SOON)) as answer:
             return json.loads(answer.read())["data"]["result"]  # type: ignore[no-any-return]
 
     def wait_for(self, query: str, wanted: Callable[[list[Any]], bool]) -> list[Any]:
-        deadline = time.monotonic() + 30
+        deadline = Deadline(30)
         found: list[Any] = []
         while True:
             try:
@@ -219,20 +222,21 @@ class Prometheus:
                 error.close()
             except OSError:
                 pass
-            assert time.monotonic() < deadline, (query, found)
+            assert deadline.left, (query, found)
             time.sleep(0.1)
 
     def close(self) -> None:
         self.process.terminate()
-        self.process.wait(SOON)
+        self.process.wait(allow(SOON))
 
 
 def values(found: list[Any]) -> list[str]:
     return [series["value"][1] for series in found]
 
 
+@pytest.mark.slow
 @needs_prometheus
-def test_prometheus_scrapes_alerts_and_forgets_what_is_gone(
+def test_prometheus_scrapes_alerts_and_drops_old_series(
     gateway: StartGateway, wire: OpenWire, tmp_path: pathlib.Path, ended: ExitStack
 ) -> None:
     gate = gateway(*PAGE)

@@ -1,4 +1,4 @@
-"""Statuses over a real broker: what arrives, and what happens when broker, network, disk or gateway do not."""
+"""Statuses over a real broker: what arrives, and what happens when broker, network, disk or gateway fails."""
 
 from __future__ import annotations
 
@@ -21,20 +21,22 @@ from typing import Any
 
 import pytest
 
+from mav_robot_status.publishers.mqtt.robot import WINDOW
 from mav_robot_status.testing import ardurover
 
-from .gateway_process import SOON, Gateway, run
+from ..deadline import SOON, Deadline, allow, in_time, wait_until
+from .gateway_process import Gateway, run
 from .mqtt_broker import MISSING, PREFIX, Broker, Certificates, Heard, Listener, free_port
 from .mqtt_fleet import measure, vehicles
 
 pytestmark = pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "mqtt.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "how-to" / "mqtt.md"
 ROBOT = "rover-1"
 KEEPALIVE = 2
 WILL = 1.5 * KEEPALIVE + 7
-"""Seconds within which mosquitto (2.0.11) says the will of a connection that has fallen silent: it looks for such every
-6 s, and counts in whole seconds. So it does with a client that holds nothing of ours."""
+"""Seconds in which mosquitto 2.0.11 publishes the will of a silent connection. It looks for silent connections every
+6 s and counts in whole seconds. It does the same for a client without our code."""
 Start = Callable[..., Any]
 
 
@@ -55,7 +57,7 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Certificates:
 
 @pytest.fixture
 def started(gateway: Callable[..., Gateway], tmp_path: Path) -> Callable[..., Gateway]:
-    """A gateway of one rover, with a broker."""
+    """A gateway of one rover that publishes to a broker."""
 
     def start(url: str, *more: str) -> Gateway:
         return gateway(
@@ -88,7 +90,10 @@ class Feeder:
         for option in options:
             command += ["--option", option]
         self.process = subprocess.Popen(
-            [*command, "--events", "1", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*command, "--events", "1", "--seconds", "1e6", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
         )
         self.told: list[int] = []
         self.cost: dict[str, Any] = {}
@@ -97,14 +102,14 @@ class Feeder:
         for thread in self._threads:
             thread.start()
 
-    def wait_for(self, changes: int, timeout: float = 60.0) -> None:
-        deadline = time.monotonic() + timeout
+    def wait_for(self, changes: int) -> None:
+        deadline = Deadline(60)
         while len(self.told) < changes:
-            assert time.monotonic() < deadline, (len(self.told), self.log)
+            assert deadline.left, (len(self.told), self.log)
             time.sleep(0.005)
 
-    def end(self, timeout: float = 60.0) -> dict[str, Any]:
-        self.process.wait(timeout)
+    def end(self) -> dict[str, Any]:
+        self.process.wait(allow(60))
         self.close()
         return self.cost
 
@@ -112,7 +117,7 @@ class Feeder:
         self.process.kill()
         self.process.wait()
         for thread in self._threads:
-            thread.join(SOON)
+            thread.join(allow(SOON))
         for pipe in (self.process.stdout, self.process.stderr):
             assert pipe is not None
             pipe.close()
@@ -139,7 +144,7 @@ def feeder(ended: contextlib.ExitStack, tmp_path: Path) -> Callable[..., Feeder]
 
 
 class Wall:
-    """A TCP relay that may be cut: nothing passes any more, and nobody is told."""
+    """A TCP relay. After a cut no byte passes, and neither end is closed."""
 
     before: tuple[str, ...] = ()
     listener: tuple[str, ...] = ()
@@ -156,7 +161,7 @@ class Wall:
 
     def close(self) -> None:
         self._stop = True
-        self._thread.join(SOON)
+        self._thread.join(allow(SOON))
         for end in [self._listening, *(end for pair in self._pairs for end in pair)]:
             end.close()
 
@@ -190,7 +195,7 @@ def wall(ended: contextlib.ExitStack) -> Callable[[int], Wall]:
 
 
 class Line:
-    """A network namespace whose only line to here may be pulled: what runs behind `before` has no other."""
+    """A network namespace with one link to this one, which a test can take down. `before` runs a command in it."""
 
     def __init__(self, port: int) -> None:
         self.to, self._cut = port, False
@@ -209,7 +214,7 @@ class Line:
         ):
             if shutil.which("ip") is None or self._ip(command):
                 self.close()
-                pytest.skip("network namespaces are not permitted here")
+                pytest.skip("no network namespaces: run as root with CAP_SYS_ADMIN and iproute2")
 
     @property
     def cut(self) -> bool:
@@ -226,7 +231,7 @@ class Line:
             self._ip(f"netns del {self._name}")
 
     def _ip(self, command: str) -> int:
-        return subprocess.run(["ip", *command.split()], capture_output=True, check=False, timeout=30).returncode
+        return subprocess.run(["ip", *command.split()], capture_output=True, check=False, timeout=allow(30)).returncode
 
 
 @pytest.fixture
@@ -239,7 +244,7 @@ def online(heard: Heard) -> bool:
 
 
 def changes(events: list[Heard]) -> list[int]:
-    """The numbers of the changes, as they came, without those that came again."""
+    """The numbers of the changes in the order of their arrival, without repetitions."""
     found, seen = [], set()
     for heard in events:
         event = json.loads(heard.text)
@@ -247,14 +252,6 @@ def changes(events: list[Heard]) -> list[int]:
             seen.add(event["id"])
             found.append(event["changed"]["error_code"]["new"])
     return found
-
-
-def eventually(found: Callable[[], Any], timeout: float = SOON) -> Any:
-    deadline = time.monotonic() + timeout
-    while not (result := found()):
-        assert time.monotonic() < deadline, f"not within {timeout} s"
-        time.sleep(0.05)
-    return result
 
 
 def shown(http: int, robot: str) -> dict[str, Any]:
@@ -265,7 +262,7 @@ def shown(http: int, robot: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("version", ["5", "3.1.1"])
-def test_a_robot_is_told_from_its_first_word_to_its_last(
+def test_a_robot_is_published_from_its_first_heartbeat_to_the_end_of_the_gateway(
     broker: Start, listener: Start, started: Start, autopilot: Start, validate: Callable[[Any], None], version: str
 ) -> None:
     at = broker()
@@ -280,21 +277,21 @@ def test_a_robot_is_told_from_its_first_word_to_its_last(
     assert first["changed"]["mode"]["old"] is None
     assert gateway.stop() == 0
     heard.wait_for(lambda h: h.what == "connection" and h.text == "OFFLINE")
-    kept = {h.what: h.text for h in _retained(listener, at.port)}
+    kept = {h.what: h.text for h in _retained(at.port)}
     assert kept["connection"] == "OFFLINE"
     validate(json.loads(kept["status"]))
     assert json.loads(kept["status"])["mode"] == "UNKNOWN"
     assert "events" not in kept
 
 
-def _retained(listener: Start, port: int) -> list[Heard]:
-    late = listener(port)
-    late.wait_for(lambda h: h.what == "connection")
-    time.sleep(0.2)
-    return [h for h in late.heard if h.retained]
+def _retained(port: int) -> list[Heard]:
+    with contextlib.closing(Listener(port)) as late:
+        late.wait_for(lambda h: h.what == "connection")
+        late.settle()
+        return [h for h in late.heard if h.retained]
 
 
-def test_events_tell_each_member_that_changed_with_what_it_was(
+def test_events_have_the_old_and_new_value_of_each_changed_member(
     broker: Start, listener: Start, started: Start, wire: Start
 ) -> None:
     at = broker()
@@ -310,17 +307,15 @@ def test_events_tell_each_member_that_changed_with_what_it_was(
     assert "stamp" not in changed
 
 
-def test_with_mqtt_5_a_status_that_nobody_renews_leaves_the_broker_by_itself(
-    broker: Start, listener: Start, feeder: Start
-) -> None:
+def test_with_mqtt_5_an_old_status_expires_on_the_broker(broker: Start, listener: Start, feeder: Start) -> None:
     at = broker()
     heard = listener(at.port)
     gateway = feeder(at.url, "--rate", "5")
     heard.wait_for(lambda h: h.what == "status")
     gateway.process.kill()
     heard.wait_for(lambda h: h.text == "CONNECTIONBROKEN")
-    time.sleep(KEEPALIVE * 1.5 + 2.5)
-    assert {h.what: h.text for h in _retained(listener, at.port)} == {"connection": "CONNECTIONBROKEN"}
+    left = {"connection": "CONNECTIONBROKEN"}
+    wait_until(lambda: {h.what: h.text for h in _retained(at.port)} == left, 15)
 
 
 def test_tls_with_a_client_certificate_and_a_password_from_the_environment(
@@ -340,7 +335,7 @@ def test_tls_with_a_client_certificate_and_a_password_from_the_environment(
     assert "horse" not in Path(f"/proc/{gateway.process.pid}/cmdline").read_text()
 
 
-def test_the_commands_of_the_document_bring_a_robot_over_tls_to_the_board(
+def test_the_commands_of_the_document_bring_a_robot_to_the_board_over_tls(
     broker: Start,
     gateway: Start,
     autopilot: Start,
@@ -365,11 +360,11 @@ def test_the_commands_of_the_document_bring_a_robot_over_tls_to_the_board(
     monkeypatch.setenv("MAV_ROBOT_STATUS_MQTT_PASSWORD", "correct horse")
     monkeypatch.setenv("SSL_CERT_FILE", certificates["ca.pem"])  # one of the system's authorities
     gateway(*showing)
-    eventually(lambda: [line["mode"] for line in served(http)] == ["MANUAL"])
+    wait_until(lambda: [line["mode"] for line in served(http)] == ["MANUAL"])
 
 
 def served(http: int) -> list[dict[str, Any]]:
-    """What a board shows; nothing while it starts."""
+    """The vehicles on a board; empty while it starts."""
     with contextlib.suppress(OSError):
         return vehicles(http)
     return []
@@ -379,7 +374,7 @@ def _passwords(folder: Path, *users: str) -> str:
     path = folder / "passwords"
     path.touch()
     for user in users or ("rover",):
-        subprocess.run(["mosquitto_passwd", "-b", str(path), user, "correct horse"], check=True, timeout=30)
+        subprocess.run(["mosquitto_passwd", "-b", str(path), user, "correct horse"], check=True, timeout=allow(30))
     return f"password_file {path}"
 
 
@@ -390,7 +385,7 @@ def test_a_broker_that_is_away_for_a_while_gets_every_event_in_order(
     broker: Start, listener: Start, feeder: Start
 ) -> None:
     at = broker(memory=True)
-    gateway = feeder(at.url, "--rate", "100", "--changes", "900", "--seconds", "60")
+    gateway = feeder(at.url, "--rate", "100", "--changes", "900")
     heard = listener(at.port)
     gateway.wait_for(200)
     at.stop()
@@ -403,7 +398,8 @@ def test_a_broker_that_is_away_for_a_while_gets_every_event_in_order(
     assert len([line for line in gateway.log if "trying again" in line]) <= 2, gateway.log
 
 
-def test_of_a_thousand_changes_none_is_lost_though_gateways_are_killed_and_the_broker_is_stopped(
+@pytest.mark.slow
+def test_none_of_a_thousand_changes_is_lost_when_gateways_are_killed_and_the_broker_stops(
     broker: Start, listener: Start, feeder: Start
 ) -> None:
     at = broker(memory=True)
@@ -412,14 +408,14 @@ def test_of_a_thousand_changes_none_is_lost_though_gateways_are_killed_and_the_b
     for number in range(5):
         if number == 1:
             at.stop()
-        killed = feeder(at.url, "--rate", "100", "--seconds", "60")
+        killed = feeder(at.url, "--rate", "100")
         killed.wait_for(200)
         killed.process.send_signal(signal.SIGKILL)
         killed.end()
         told.append(killed.told)
         if number == 3:
             at.start()
-    last = feeder(at.url, "--rate", "1", "--changes", "1", "--seconds", "60")
+    last = feeder(at.url, "--rate", "1", "--changes", "1")
     last.wait_for(1)
     assert sum(map(len, told)) >= 1000
     assert last.end()["waiting"] == 0
@@ -436,7 +432,7 @@ def sessions(heard: Listener) -> list[list[int]]:
     return [changes([h for h in events if json.loads(h.text)["session"] == session]) for session in begun]
 
 
-def test_every_line_that_a_gateway_wrote_before_it_was_killed_has_its_event(
+def test_every_line_that_a_killed_gateway_wrote_has_its_event(
     broker: Start, listener: Start, gateway: Start, started: Start, wire: Start, tmp_path: Path
 ) -> None:
     at = broker(memory=True)
@@ -459,22 +455,23 @@ def test_every_line_that_a_gateway_wrote_before_it_was_killed_has_its_event(
     heard.wait(lambda: not told - {json.loads(h.text)["stamp"] for h in heard.of("events")})
 
 
-@pytest.mark.parametrize("way", ["wall", "line"])
-def test_a_network_that_is_cut_costs_no_event_and_is_noticed_on_both_sides(
+@pytest.mark.parametrize("way", ["wall", pytest.param("line", marks=pytest.mark.slow)])
+def test_a_cut_network_loses_no_event_and_both_sides_notice_it(
     broker: Start, listener: Start, feeder: Start, board: Start, wall: Start, line: Start, way: str
 ) -> None:
     between = {"wall": wall, "line": line}[way](free_port())
     at = broker(*between.listener, port=between.to)
     boards = [board(at.url), board(at.url)]
     heard = listener(at.port)
-    gateway = feeder(between.url, "--rate", "20", "--seconds", "60", before=between.before)
+    gateway = feeder(between.url, "--rate", "20", before=between.before)
     gateway.wait_for(40)
-    eventually(lambda: all(shown(http, "robot0")["mode"] == "AUTO" for http in boards))
+    wait_until(lambda: all(shown(http, "robot0")["mode"] == "AUTO" for http in boards))
     cut = time.monotonic()
     between.cut = True
-    eventually(lambda: all(shown(http, "robot0")["mode"] == "UNKNOWN" for http in boards), KEEPALIVE + 0.5)
+    wait_until(lambda: all(shown(http, "robot0")["mode"] == "UNKNOWN" for http in boards), KEEPALIVE + 0.5)
     broken = heard.wait_for(lambda h: h.text == "CONNECTIONBROKEN", WILL + SOON)
-    assert KEEPALIVE < broken.at - cut < WILL + 1  # for a busy machine
+    assert broken.at - cut > KEEPALIVE
+    assert in_time(broken.at - cut, WILL + 1)
     gateway.wait_for(len(gateway.told) + 100)
     between.cut = False
     heard.wait_for(online, 20, after=broken.at)
@@ -482,12 +479,13 @@ def test_a_network_that_is_cut_costs_no_event_and_is_noticed_on_both_sides(
     heard.wait(lambda: len(changes(heard.of("events"))) >= count, 20)
     told = changes(heard.of("events"))
     assert told == list(range(1, len(told) + 1))
-    eventually(lambda: all(shown(http, "robot0")["mode"] == "AUTO" for http in boards))
-    time.sleep(KEEPALIVE * 2)
-    assert heard.of("connection")[-1].text == "ONLINE"  # the will of the old connection does not come after it
+    wait_until(lambda: all(shown(http, "robot0")["mode"] == "AUTO" for http in boards))
+    gateway.wait_for(len(gateway.told) + 60)  # 3 s: the broker looks for the old connection after 1.5 * KEEPALIVE
+    heard.settle()
+    assert heard.of("connection")[-1].text == "ONLINE"  # the will of the old connection does not follow
 
 
-def test_a_full_disk_loses_nothing_while_memory_holds(
+def test_a_full_disk_loses_nothing_while_there_is_memory(
     broker: Start, listener: Start, feeder: Start, tmp_path: Path
 ) -> None:
     disk = tmp_path / "disk"
@@ -495,7 +493,7 @@ def test_a_full_disk_loses_nothing_while_memory_holds(
     with _small(disk) as full:
         at = broker()
         at.stop()
-        gateway = feeder(at.url, "--rate", "100", "--changes", "900", "--seconds", "60", spool=disk / "s.sqlite")
+        gateway = feeder(at.url, "--rate", "100", "--changes", "900", spool=disk / "s.sqlite")
         gateway.wait_for(100)
         full()
         gateway.wait_for(500)
@@ -504,10 +502,10 @@ def test_a_full_disk_loses_nothing_while_memory_holds(
         heard.wait(lambda: len(changes(heard.of("events"))) >= 900, 30)
         assert changes(heard.of("events")) == gateway.told
         assert gateway.end()["dropped"] == 0
-        assert len([line for line in gateway.log if "takes no events" in line]) == 1, gateway.log
+        assert len([line for line in gateway.log if "cannot write events to" in line]) == 1, gateway.log
 
 
-def test_a_gateway_that_is_killed_while_the_disk_is_full_leaves_its_events_all_the_same(
+def test_a_gateway_that_is_killed_with_a_full_disk_keeps_its_events(
     broker: Start, listener: Start, feeder: Start, tmp_path: Path
 ) -> None:
     disk = tmp_path / "disk"
@@ -515,7 +513,7 @@ def test_a_gateway_that_is_killed_while_the_disk_is_full_leaves_its_events_all_t
     with _small(disk, "2m") as full:
         at = broker()
         at.stop()
-        killed = feeder(at.url, "--rate", "100", "--seconds", "60", spool=disk / "s.sqlite")
+        killed = feeder(at.url, "--rate", "100", spool=disk / "s.sqlite")
         killed.wait_for(100)
         full()
         killed.wait_for(500)
@@ -523,41 +521,41 @@ def test_a_gateway_that_is_killed_while_the_disk_is_full_leaves_its_events_all_t
         killed.end()
         at.start()
         heard = listener(at.port)
-        feeder(at.url, "--rate", "1", "--events", "0", "--seconds", "60", spool=disk / "s.sqlite")
+        feeder(at.url, "--rate", "1", "--events", "0", spool=disk / "s.sqlite")
         heard.wait(lambda: sessions(heard) and len(sessions(heard)[0]) >= len(killed.told), 20)
         assert sessions(heard)[0][: len(killed.told)] == killed.told
-        assert any("takes no events" in line for line in killed.log), killed.log
+        assert any("cannot write events to" in line for line in killed.log), killed.log
 
 
-def test_a_disk_that_hangs_does_not_hold_up_the_gateway(
+def test_a_hanging_disk_does_not_delay_the_gateway(
     broker: Start, listener: Start, feeder: Start, tmp_path: Path
 ) -> None:
     with _freezable(tmp_path) as (disk, freeze):
         at = broker()
         heard = listener(at.port)
-        gateway = feeder(at.url, "--rate", "100", "--changes", "400", "--seconds", "60", spool=disk / "s.sqlite")
+        gateway = feeder(at.url, "--rate", "100", "--changes", "400", spool=disk / "s.sqlite")
         gateway.wait_for(100)
         freeze("-f")
         before = time.monotonic()
         gateway.wait_for(len(gateway.told) + 100)
-        assert time.monotonic() - before < 2.0  # it goes on at its own rate
+        assert in_time(time.monotonic() - before, 2.0)  # 100 changes at their own rate
         freeze("-u")
         assert gateway.end()["dropped"] == 0
         heard.wait(lambda: changes(heard.of("events")) == gateway.told)
-        assert len([line for line in gateway.log if "the disk took no event within" in line]) == 1, gateway.log
+        assert len([line for line in gateway.log if "the disk wrote no event within" in line]) == 1, gateway.log
 
 
 @contextlib.contextmanager
 def _freezable(folder: Path) -> Iterator[tuple[Path, Callable[[str], object]]]:
-    """A disk on which every write waits from `-f` to `-u`."""
+    """A disk on which every write blocks from `-f` to `-u`."""
     image, disk = folder / "image", folder / "disk"
     disk.mkdir()
     with image.open("wb") as file:
         file.truncate(20_000_000)
     for command in (["mkfs.ext4", "-q", str(image)], ["mount", "-o", "loop", str(image), str(disk)]):
         if shutil.which(command[0]) is None or subprocess.run(command, capture_output=True, check=False).returncode:
-            pytest.skip("mounting is not permitted here")
-    freeze = functools.partial(subprocess.run, check=False, timeout=30)
+            pytest.skip("no mounts: run as root with CAP_SYS_ADMIN")
+    freeze = functools.partial(subprocess.run, check=False, timeout=allow(30))
     try:
         yield disk, lambda what: freeze(["fsfreeze", what, str(disk)])
     finally:
@@ -567,10 +565,10 @@ def _freezable(folder: Path) -> Iterator[tuple[Path, Callable[[str], object]]]:
 
 @contextlib.contextmanager
 def _small(folder: Path, size: str = "300k") -> Iterator[Callable[[], None]]:
-    """A small disk; what is given fills it."""
+    """A small disk, and a function that fills it."""
     mount = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)], capture_output=True)
     if mount.returncode:
-        pytest.skip("mounting is not permitted here")
+        pytest.skip("no mounts: run as root with CAP_SYS_ADMIN")
 
     def fill() -> None:
         with contextlib.suppress(OSError), open(folder / "rubbish", "wb", buffering=0) as file:
@@ -583,61 +581,69 @@ def _small(folder: Path, size: str = "300k") -> Iterator[Callable[[], None]]:
         subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
-def test_what_is_too_much_is_dropped_from_the_oldest_on_and_counted(
+def test_beyond_the_limit_the_oldest_events_are_dropped_and_counted(
     broker: Start, listener: Start, feeder: Start
 ) -> None:
     at = broker()
     at.stop()
-    gateway = feeder(at.url, *("--rate", "100", "--changes", "400", "--seconds", "60", "--option", "spool_size=0.05"))
+    gateway = feeder(at.url, *("--rate", "100", "--changes", "400", "--option", "spool_size=0.05"))
     gateway.wait_for(300)
     at.start()
     heard = listener(at.port)
     last = heard.wait_for(lambda h: h.what == "events" and '"new": 400}' in h.text, 20)
     told = changes(heard.of("events"))
     assert told == list(range(401 - len(told), 401))
-    assert json.loads(last.text)["dropped"] == 400 - len(told) > 0
-    assert gateway.end()["dropped"] == 400 - len(told)
+    missing = 400 - len(told)
+    # an event that is on its way to the broker when its place is needed is counted, and still arrives
+    assert 0 < missing <= json.loads(last.text)["dropped"] <= gateway.end()["dropped"] <= missing + WINDOW
 
 
 # -- the board -------------------------------------------------------------------------------------------------------
 
 
-def test_every_board_shows_a_robot_and_that_its_gateway_was_killed(
+def test_every_board_shows_a_robot_and_the_loss_of_its_gateway(
     broker: Start, board: Start, started: Start, autopilot: Start
 ) -> None:
     at = broker()
     boards = [board(at.url), board(at.url)]
     gateway = started(at.url)
     autopilot(ardurover.READY, gateway.address)
-    eventually(lambda: all(shown(http, ROBOT)["mode"] in ("MANUAL", "AUTO") for http in boards))
+    wait_until(lambda: all(shown(http, ROBOT)["mode"] in ("MANUAL", "AUTO") for http in boards))
     gateway.process.kill()
     killed = time.monotonic()
-    eventually(lambda: all(shown(http, ROBOT)["link"]["state"] == "LOST" for http in boards), KEEPALIVE)
-    assert time.monotonic() - killed < KEEPALIVE
+    wait_until(lambda: all(shown(http, ROBOT)["link"]["state"] == "LOST" for http in boards), KEEPALIVE)
+    assert in_time(time.monotonic() - killed, KEEPALIVE)
     for line in (shown(http, ROBOT) for http in boards):
         assert (line["mode"], line["e_stopped"], line["in_error"]) == ("UNKNOWN", None, None)
         assert line["inhibits"][0]["text"] == "the gateway is gone"
 
 
-def test_a_status_that_a_broker_kept_over_its_own_end_is_never_shown_as_current(
-    broker: Start, board: Start, feeder: Start, listener: Start
+def test_a_status_that_a_broker_kept_over_a_restart_is_not_shown_as_current(
+    broker: Start, board: Start, feeder: Start, listener: Start, tmp_path: Path
 ) -> None:
     at = broker(memory=True)
     gateway = feeder(at.url, "--rate", "5", "--events", "0", "--option", "version=3.1.1")
     listener(at.port).wait_for(lambda h: h.what == "status")
-    time.sleep(2.5)  # the broker saves what it keeps
-    at.stop(kill=True)  # so that nobody says the will
+    saved = tmp_path / "mosquitto.db"
+    wait_until(lambda: saved.exists() and b"robot0/status" in saved.read_bytes())
+    at.stop(kill=True)  # so that it publishes no will
     gateway.process.kill()
     at.start()
-    kept = {h.what: h.text for h in _retained(listener, at.port)}
+    kept = {h.what: h.text for h in _retained(at.port)}
     assert kept["connection"] == "ONLINE"
     assert json.loads(kept["status"])["mode"] == "AUTO"
     http = board(at.url)
-    line = eventually(lambda: (it := shown(http, "robot0"))["link"]["state"] and it)
-    assert (line["link"]["state"], line["mode"]) == ("LOST", "UNKNOWN")
+
+    def lost() -> bool:
+        """Until the status has arrived, the robot is absent or was never seen."""
+        line = shown(http, "robot0")
+        assert line["mode"] in (None, "UNKNOWN")
+        return bool(line["link"]["state"] == "LOST")
+
+    wait_until(lost)
 
 
-def test_a_board_beyond_a_bridge_shows_what_is_so_and_doubts_it_when_the_bridge_is_down(
+def test_a_board_behind_a_bridge_shows_unknown_while_the_bridge_is_down(
     broker: Start, board: Start, feeder: Start
 ) -> None:
     near = broker()
@@ -646,33 +652,34 @@ def test_a_board_beyond_a_bridge_shows_what_is_so_and_doubts_it_when_the_bridge_
         *("restart_timeout 1", "keepalive_interval 5", "remote_clientid bridge"),
     )
     http = board(far.url)
-    feeder(near.url, "--rate", "5", "--seconds", "60")
-    eventually(lambda: shown(http, "robot0")["mode"] == "AUTO", 15)
+    feeder(near.url, "--rate", "5")
+    wait_until(lambda: shown(http, "robot0")["mode"] == "AUTO", 15)
     near.stop(kill=True)
-    eventually(lambda: shown(http, "robot0")["mode"] == "UNKNOWN", KEEPALIVE + 2)
+    wait_until(lambda: shown(http, "robot0")["mode"] == "UNKNOWN", KEEPALIVE + 2)
     near.start()
-    eventually(lambda: shown(http, "robot0")["mode"] == "AUTO", 40)
+    wait_until(lambda: shown(http, "robot0")["mode"] == "AUTO", 40)
 
 
-def test_a_board_without_its_broker_says_so(broker: Start, board: Start, feeder: Start) -> None:
+def test_a_board_without_its_broker_shows_unknown(broker: Start, board: Start, feeder: Start) -> None:
     at = broker()
     http = board(at.url)
-    feeder(at.url, "--rate", "5", "--seconds", "60")
-    eventually(lambda: shown(http, "robot0")["mode"] == "AUTO")
+    feeder(at.url, "--rate", "5")
+    wait_until(lambda: shown(http, "robot0")["mode"] == "AUTO")
     at.stop(kill=True)
-    eventually(lambda: shown(http, "robot0")["mode"] == "UNKNOWN", KEEPALIVE + 2)
+    wait_until(lambda: shown(http, "robot0")["mode"] == "UNKNOWN", KEEPALIVE + 2)
 
 
-def test_a_board_that_hears_nobody_says_once_why_that_may_be(broker: Start, gateway: Start, tmp_path: Path) -> None:
+def test_a_board_without_robots_logs_the_possible_reasons_once(broker: Start, gateway: Start, tmp_path: Path) -> None:
     rights = tmp_path / "rights"
     rights.write_text("topic read elsewhere\n")
     at = broker(f"acl_file {rights}")  # mosquitto lets us subscribe all the same, and passes on nothing
     shown = gateway("board", at.url, "--http", f"127.0.0.1:{free_port()}")
-    shown.wait_for_log(f"nothing below {PREFIX}/ so far: is no gateway there, or may we not read it")
-    time.sleep(1)
+    shown.wait_for_log(f"no message below {PREFIX}/ so far: no gateway publishes there, or the broker denies reading")
+    assert shown.stop() == 0
     assert len([line for line in shown.log if "so far" in line]) == 1
 
 
+@pytest.mark.slow
 def test_two_hundred_robots_on_one_board(tmp_path: Path) -> None:
     found = measure(200, 2, 4.0, tmp_path)
     assert (found["live_on_the_board"], found["events_missing"]) == (200, 0)
@@ -680,23 +687,23 @@ def test_two_hundred_robots_on_one_board(tmp_path: Path) -> None:
     assert found["board_cpu_percent"] < 50
 
 
-# -- what a person has to put right ------------------------------------------------------------------------------------
+# -- errors that the user must correct ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("lines", "more", "says"),
     [
         pytest.param(["secure"], ["--mqtt-user", "rover", "--mqtt-password-file", "WRONG"], "refuses", id="password"),
-        pytest.param(["tls"], ["--mqtt-ca", "other.pem"], "certificate is not believed", id="another CA"),
+        pytest.param(["tls"], ["--mqtt-ca", "other.pem"], "certificate is not trusted", id="another CA"),
         pytest.param(["expired"], ["--mqtt-ca", "ca.pem"], "certificate has expired", id="expired"),
         pytest.param(["mutual"], ["--mqtt-ca", "ca.pem"], "client certificate", id="no client certificate"),
-        pytest.param(["forbidden"], [], "may not do what is asked", id="forbidden will"),
-        pytest.param(["no events"], [], "does not let us publish", id="forbidden events"),
-        pytest.param(["plain"], ["--mqtt-ca", "ca.pem"], "does it speak TLS on this port", id="no TLS"),
+        pytest.param(["forbidden"], [], "certificate is not authorized", id="forbidden will"),
+        pytest.param(["no events"], [], "refuses publications under", id="forbidden events"),
+        pytest.param(["plain"], ["--mqtt-ca", "ca.pem"], "does it use TLS on this port", id="no TLS"),
         pytest.param(["nobody"], [], "Connection refused", id="no broker"),
     ],
 )
-def test_what_is_wrong_is_one_line_and_tried_again_without_hurry(
+def test_a_connection_failure_is_one_line_and_retried_with_backoff(
     broker: Start,
     started: Start,
     certificates: Certificates,
@@ -730,40 +737,41 @@ def test_what_is_wrong_is_one_line_and_tried_again_without_hurry(
         at.stop()
     files = {name: certificates[name] for name in ("ca.pem", "other.pem")} | {"WRONG": str(wrong)}
     secure = lines[0] in ("tls", "expired", "mutual", "plain")
+    began, first = time.monotonic(), log.read_text().count(" connection from ")
     gateway = started(at.tls_url if secure else at.url, "--system", "1", *(files.get(word, word) for word in more))
     gateway.wait_for_log(says)
-    used, tried = gateway.cpu(), log.read_text().count(" connection from ")
-    time.sleep(4)
-    assert gateway.cpu() - used < 0.5
-    assert lines == ["nobody"] or 1 <= log.read_text().count(" connection from ") - tried <= 3  # after 1 s, 2 s, ...
-    complaints = [line for line in gateway.log if "trying again" in line]
-    assert len(complaints) == 1, gateway.log
+    if lines != ["nobody"]:
+        wait_until(lambda: log.read_text().count(" connection from ") - first >= 3)
+        assert time.monotonic() - began > 2.0  # it waits 1 s, then 2 s, each at least 0.7 times that
+    assert gateway.cpu() < 2.0
+    warnings = [line for line in gateway.log if "trying again" in line]
+    assert len(warnings) == 1, gateway.log
     assert "swordfish" not in "".join(gateway.log)
     assert gateway.stop() == 0
     assert "Traceback" not in "".join(gateway.log)
 
 
-def test_two_gateways_that_publish_one_robot_are_told(broker: Start, feeder: Start, tmp_path: Path) -> None:
+def test_two_gateways_for_one_robot_are_reported(broker: Start, feeder: Start, tmp_path: Path) -> None:
     at = broker()
-    first = feeder(at.url, "--rate", "5", "--seconds", "60")
+    first = feeder(at.url, "--rate", "5")
     first.wait_for(3)
-    feeder(at.url, "--rate", "5", "--seconds", "60", spool=tmp_path / "other.sqlite")
-    eventually(lambda: any("does another gateway publish the same robot" in line for line in first.log))
+    feeder(at.url, "--rate", "5", spool=tmp_path / "other.sqlite")
+    wait_until(lambda: any("does another gateway publish the same robot" in line for line in first.log))
 
 
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--mqtt", "mqtts://rover:swordfish@broker/robots"], "no user or password in the URL"),
-        (["--mqtt", "http://broker/robots"], "is no broker; write mqtts://"),
-        (["--mqtt", "mqtts://broker"], "names no prefix"),
-        (["--mqtt-user", "rover"], "add --mqtt mqtts://broker/prefix"),
-        (["--mqtt", "mqtt://127.0.0.1/robots", "--mqtt-robot", "{color}"], r"it may hold \{system\}"),
+        (["--mqtt", "mqtts://rover:swordfish@broker/robots"], "a URL with a user or password is visible"),
+        (["--mqtt", "http://broker/robots"], "is not a broker; write mqtts://"),
+        (["--mqtt", "mqtts://broker"], "has no prefix"),
+        (["--mqtt-user", "rover"], "--mqtt-user needs --mqtt URL"),
+        (["--mqtt", "mqtt://127.0.0.1/robots", "--mqtt-robot", "{color}"], r"the placeholders are \{system\}"),
         (["--mqtt", "mqtts://127.0.0.1/robots", "--mqtt-ca", "/nowhere.pem"], "No such file"),
-        (["--mqtt", "mqtt://127.0.0.1/robots", "--mqtt-spool", "/proc/x/s"], "events cannot wait in /proc/x/s"),
+        (["--mqtt", "mqtt://127.0.0.1/robots", "--mqtt-spool", "/proc/x/s"], "cannot store events in /proc/x/s"),
     ],
 )
-def test_a_fault_on_the_command_line_is_one_line(arguments: list[str], says: str) -> None:
+def test_an_error_on_the_command_line_is_one_line(arguments: list[str], says: str) -> None:
     done = run("udp:127.0.0.1:0", *arguments)
     assert done.returncode in (1, 2)
     assert re.search(says, done.stderr), done.stderr

@@ -1,4 +1,4 @@
-"""`--record`: what was received and sent, as ground stations open it."""
+"""`--record`: received and sent frames in a file that ground stations open."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pymavlink import mavutil
 
 from mav_robot_status.testing import FakeAutopilot, ardurover
 
+from ..deadline import wait_until
 from .gateway_process import Gateway, run
 
 StartGateway = Callable[..., Gateway]
@@ -26,9 +27,7 @@ def kinds(log: Path) -> list[tuple[str, int]]:
     return found
 
 
-def test_what_is_recorded_is_replayed_as_it_was_live(
-    gateway: StartGateway, autopilot: StartAutopilot, tmp_path: Path
-) -> None:
+def test_a_recording_replays_as_it_was_live(gateway: StartGateway, autopilot: StartAutopilot, tmp_path: Path) -> None:
     log = tmp_path / "flight.tlog"
     gate = gateway("udpin:127.0.0.1:0", "--record", str(log))
     rover = autopilot(ardurover.READY, gate.address)
@@ -48,7 +47,7 @@ def test_what_is_recorded_is_replayed_as_it_was_live(
     assert different[-3:] == ["fals", "true", "fals"]
 
 
-def test_a_recording_survives_that_the_process_is_killed(
+def test_a_recording_survives_the_kill_of_its_process(
     gateway: StartGateway, autopilot: StartAutopilot, tmp_path: Path
 ) -> None:
     log = tmp_path / "flight.tlog"
@@ -57,7 +56,8 @@ def test_a_recording_survives_that_the_process_is_killed(
     gate.wait_for(lambda s: s["drives_powered"] is False)
     rover.arm()
     armed = gate.wait_for(lambda s: s["drives_powered"] is True)
-    gate.wait_for(lambda s: True, after=armed.at + 1.5)
+    wait_until(lambda: len(kinds(log)) >= 4)  # the writer flushes once a second
+    gate.wait_for_lines(1, after=armed.at)
     gate.process.send_signal(signal.SIGKILL)
     gate.wait_for_end()
     before = len(kinds(log))
@@ -75,7 +75,7 @@ def test_a_recording_survives_that_the_process_is_killed(
     assert "garbage" not in replayed.stderr
 
 
-def test_a_file_that_is_no_log_is_not_overwritten(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_log_is_not_overwritten(tmp_path: Path) -> None:
     letter = tmp_path / "letter.txt"
     letter.write_text("Dear robot, " * 20)
     result = run("udpin:127.0.0.1:0", "--record", str(letter))

@@ -1,4 +1,4 @@
-"""A recorded log through the installed command."""
+"""Replay of a recorded log with the installed command."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ import pytest
 
 from mav_robot_status.testing import DEMO
 
-from .gateway_process import COMMAND, SOON, run
+from ..deadline import SOON, Deadline, allow
+from .gateway_process import COMMAND, run
 
 
 def lines(text: str) -> list[dict[str, Any]]:
@@ -33,12 +34,12 @@ def test_a_replay_gives_the_same_lines_every_time(replayed: str, demo_log: Path)
     assert replayed == run(str(demo_log)).stdout
 
 
-def test_every_line_is_as_the_schema_says(replayed: str, validate: Callable[[Any], None]) -> None:
+def test_every_line_matches_the_schema(replayed: str, validate: Callable[[Any], None]) -> None:
     for line in lines(replayed):
         validate(line)
 
 
-def test_the_story_is_told_on_the_logs_own_time(replayed: str) -> None:
+def test_the_lines_have_the_time_of_the_log(replayed: str) -> None:
     statuses = lines(replayed)
     assert statuses[0]["stamp"].startswith("2027-01-15T08:00:00")
     assert [s["seq"] for s in statuses] == list(range(len(statuses)))
@@ -51,11 +52,11 @@ def test_the_story_is_told_on_the_logs_own_time(replayed: str) -> None:
 
 
 @pytest.mark.parametrize("arguments", [("--rate", "2"), ("--changes-only",), ("--rate", "0")])
-def test_options_thin_the_lines(replayed: str, demo_log: Path, arguments: tuple[str, ...]) -> None:
+def test_options_reduce_the_lines(replayed: str, demo_log: Path, arguments: tuple[str, ...]) -> None:
     assert 10 < len(lines(run(str(demo_log), *arguments).stdout)) < len(lines(replayed)) / 2
 
 
-def test_the_forms_of_ros(demo_log: Path) -> None:
+def test_the_ros_formats(demo_log: Path) -> None:
     ros1 = lines(run(str(demo_log), "--format", "ros1", "--changes-only").stdout)
     ros2 = lines(run(str(demo_log), "--format", "ros2", "--changes-only").stdout)
     fields = ("mode", "e_stopped", "drives_powered", "motion_possible", "in_motion", "in_error")
@@ -75,14 +76,14 @@ def test_the_lines_go_to_a_file_or_nowhere(replayed: str, demo_log: Path, tmp_pa
     assert run(str(demo_log), "--json", "none").stdout == ""
 
 
-def test_a_reader_that_goes_ends_the_replay_with_0(demo_log: Path) -> None:
+def test_a_closed_reader_ends_the_replay_with_0(demo_log: Path) -> None:
     with subprocess.Popen([*COMMAND, str(demo_log)], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.readline()
         process.stdout.close()
         log = process.stderr.read()
-        assert process.wait(SOON) == 0
+        assert process.wait(allow(SOON)) == 0
     assert b"Traceback" not in log
 
 
@@ -90,14 +91,14 @@ def test_sigterm_ends_a_replay_that_waits_for_its_reader(demo_log: Path) -> None
     with subprocess.Popen([*COMMAND, str(demo_log)], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         process.stdout.read(1)  # it has begun, and soon fills the pipe
-        deadline = time.monotonic() + SOON
+        deadline = Deadline()
         idle = 0
         while idle < 3:  # until it waits in a write
-            assert time.monotonic() < deadline
+            assert deadline.left
             idle = idle + 1 if _sleeps(process.pid) else 0
             time.sleep(0.02)
         process.send_signal(signal.SIGTERM)
-        _, log = process.communicate(timeout=SOON)
+        _, log = process.communicate(timeout=allow(SOON))
         assert process.returncode == 0
     assert b"Traceback" not in log
 
@@ -119,7 +120,7 @@ def test_noise_between_the_records_is_counted_and_the_lines_are_the_same(
     assert "300 bytes of garbage" in done.stderr
 
 
-def test_what_is_no_log_is_one_line_and_2(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_log_is_one_line_and_exit_code_2(tmp_path: Path) -> None:
     log = tmp_path / "noise.tlog"
     log.write_bytes(bytes(range(256)) * 40)
     done = run(str(log))

@@ -19,6 +19,7 @@ from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.views.timeline import TRACKS
 from tests.docs.documents import table
 
+from ..deadline import allow
 from .gateway_process import COMMAND, run
 
 ROOT = Path(__file__).parents[2]
@@ -54,7 +55,7 @@ def data_of(page: Path) -> dict[str, Any]:
 # -- what it adds up to ------------------------------------------------------------------------------------------------
 
 
-def test_the_demos_story_adds_up(demo_log: Path) -> None:
+def test_the_totals_of_the_demo_are_right(demo_log: Path) -> None:
     (found,) = reported(str(demo_log))
     totals = found["totals"]
     assert totals["arm_cycles"] == 1
@@ -67,7 +68,7 @@ def test_the_demos_story_adds_up(demo_log: Path) -> None:
         assert sum(totals[name].values()) == pytest.approx(totals["seconds"], abs=1e-4)
 
 
-def test_a_silence_of_the_link_is_a_gap_in_what_is_known() -> None:
+def test_during_a_silent_link_every_field_is_unknown() -> None:
     (found,) = reported(str(LOGS / "ardurover-4.5.6-link-silence.tlog"))
     lost = [interval for interval in found["intervals"]["link"] if interval["value"] == "LOST"]
     assert lost
@@ -81,7 +82,7 @@ def test_a_silence_of_the_link_is_a_gap_in_what_is_known() -> None:
             assert during == [None], field
 
 
-def test_a_clock_that_is_set_begins_a_segment_and_counts_for_nothing(tmp_path: Path) -> None:
+def test_a_clock_step_begins_a_segment_and_adds_no_time(tmp_path: Path) -> None:
     log = tmp_path / "jump.tlog"
     log.write_bytes(beats(*heartbeats(0, 10)) + beats(*heartbeats(-7200, -7190)))
     (found,) = reported(str(log))
@@ -91,7 +92,7 @@ def test_a_clock_that_is_set_begins_a_segment_and_counts_for_nothing(tmp_path: P
     assert len(found["intervals"]["link"]) >= 2
 
 
-def test_every_vehicle_of_every_log_is_told(tmp_path: Path, demo_log: Path) -> None:
+def test_every_vehicle_of_every_log_is_reported(tmp_path: Path, demo_log: Path) -> None:
     two = tmp_path / "two.tlog"
     two.write_bytes(beats(*heartbeats(0, 5)) + beats(*heartbeats(5, 10), system=7))
     found = reported(str(demo_log), str(two))
@@ -102,7 +103,7 @@ def test_every_vehicle_of_every_log_is_told(tmp_path: Path, demo_log: Path) -> N
 # -- the page ----------------------------------------------------------------------------------------------------------
 
 
-def test_the_page_is_written_beside_and_its_name_is_printed(tmp_path: Path, demo_log: Path) -> None:
+def test_the_page_is_written_to_the_working_folder_and_its_name_is_printed(tmp_path: Path, demo_log: Path) -> None:
     done = run("report", "-q", str(demo_log), cwd=tmp_path)
     assert (done.returncode, done.stdout) == (0, "demo.html\n")
     assert [path.name for path in tmp_path.iterdir()] == ["demo.html"]
@@ -111,7 +112,7 @@ def test_the_page_is_written_beside_and_its_name_is_printed(tmp_path: Path, demo
     assert (tmp_path / "demo.html").stat().st_size < 100_000
 
 
-def test_with_as_json_a_page_is_written_only_if_it_is_asked_for(tmp_path: Path, demo_log: Path) -> None:
+def test_with_as_json_a_page_is_written_only_with_an_output_option(tmp_path: Path, demo_log: Path) -> None:
     assert json.loads(run("report", "-q", str(demo_log), "--as-json", cwd=tmp_path).stdout)["log"] == "demo.tlog"
     assert not list(tmp_path.iterdir())
     done = run("report", "-q", str(demo_log), "--as-json", "-o", "a.html", cwd=tmp_path)
@@ -119,7 +120,7 @@ def test_with_as_json_a_page_is_written_only_if_it_is_asked_for(tmp_path: Path, 
     assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
 
 
-def test_a_text_that_is_a_script_stays_a_text(tmp_path: Path) -> None:
+def test_a_script_in_a_text_is_not_executed(tmp_path: Path) -> None:
     log, page = tmp_path / "<b>&.tlog", tmp_path / "page.html"
     armed = heartbeats(0, 10, base_mode=193)
     log.write_bytes(beats(*armed[:10], (5.0, Statustext(2, ATTACK.encode(), 0, 0)), *armed[11:]))
@@ -138,13 +139,13 @@ def test_a_text_that_is_a_script_stays_a_text(tmp_path: Path) -> None:
     [
         ((), 2, "required: LOG"),
         (("nowhere.tlog",), 2, "cannot read the log"),
-        (("{log}", "-o", "{log}"), 2, "is no .html file, so it is not overwritten"),
+        (("{log}", "-o", "{log}"), 2, "is not an .html file, so it is not overwritten"),
         (("{log}", "-o", "nowhere/a.html"), 1, "cannot write the report"),
         (("{gcs}",), 1, "no autopilot was heard, so there is nothing to show"),
         (("{text}",), 2, "is not a recorded log"),
     ],
 )
-def test_what_cannot_be_is_told_in_a_line(
+def test_an_error_is_one_line_with_its_exit_code(
     tmp_path: Path, demo_log: Path, arguments: tuple[str, ...], code: int, message: str
 ) -> None:
     gcs, text = tmp_path / "gcs.tlog", tmp_path / "text.tlog"
@@ -158,11 +159,13 @@ def test_what_cannot_be_is_told_in_a_line(
     assert demo_log.read_bytes() == before
 
 
-def test_on_a_terminal_it_tells_how_far_it_is(tmp_path: Path, demo_log: Path) -> None:
+def test_on_a_terminal_it_shows_its_progress(tmp_path: Path, demo_log: Path) -> None:
     ours, theirs = pty.openpty()
     try:
         command = [*COMMAND, "report", "-q", str(demo_log)]
-        done = subprocess.run(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=theirs, timeout=30, check=True)
+        done = subprocess.run(
+            command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=theirs, timeout=allow(30), check=True
+        )
         seen = os.read(ours, 1 << 16).decode()
     finally:
         os.close(ours)
@@ -180,7 +183,7 @@ def opened(tmp_path: Path) -> Callable[[Path], str]:
     """What a page has become once a browser has run it."""
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
-        pytest.skip("no Chromium is installed")
+        pytest.skip("chromium is not installed: apt-get install chromium")
     profile = f"--user-data-dir={tmp_path / 'profile'}"
     quiet = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
     command = [browser, *quiet.split(), "--disable-component-update", "--disable-sync", profile]
@@ -190,7 +193,7 @@ def opened(tmp_path: Path) -> Callable[[Path], str]:
             [*command, "--virtual-time-budget=3000", "--dump-dom", page.as_uri()],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=allow(60),
             check=True,
         )
         return done.stdout
@@ -213,7 +216,7 @@ def test_a_browser_draws_a_row_for_each_field_and_reason(
         assert words in shown, words
 
 
-def test_a_browser_runs_nothing_that_came_from_the_wire(tmp_path: Path, opened: Callable[[Path], str]) -> None:
+def test_a_browser_executes_nothing_from_the_wire(tmp_path: Path, opened: Callable[[Path], str]) -> None:
     log, page = tmp_path / "attack.tlog", tmp_path / "attack.html"
     armed = heartbeats(0, 10, base_mode=193)
     image = Statustext(2, b"<img src=x onerror=document.title=1>", 0, 0)
@@ -231,9 +234,9 @@ def test_a_browser_runs_nothing_that_came_from_the_wire(tmp_path: Path, opened: 
 # -- the document ------------------------------------------------------------------------------------------------------
 
 
-def test_the_document_shows_the_form_and_the_figures() -> None:
-    text = (ROOT / "docs" / "report.md").read_text("utf-8")
+def test_the_document_has_the_members_and_the_totals() -> None:
+    text = (ROOT / "docs" / "reference" / "report.md").read_text("utf-8")
     (log,) = re.findall(r"`(tests/recorded/logs/\S+\.tlog)`", text)
     (found,) = reported(str(ROOT / log))
     assert json.loads(text.partition("```text\n")[2].partition("```")[0]) == found["totals"]
-    assert [row[0] for row in table("docs/report.md", "member")] == list(found)
+    assert [row[0] for row in table("docs/reference/report.md", "member")] == list(found)

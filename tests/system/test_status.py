@@ -1,4 +1,4 @@
-"""From HEARTBEAT to JSON line, through the installed command."""
+"""From HEARTBEAT to JSON line, with the installed command."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ import pytest
 
 from mav_robot_status.testing import FakeAutopilot, arducopter, ardurover
 
-from .gateway_process import Gateway
+from ..deadline import in_time
+from .gateway_process import Gateway, Line
 from .wire import Wire
 
 HANDLE = "industrial_robot_status_handle"
@@ -40,7 +41,7 @@ def test_arming_and_modes_are_in_a_line_within_50_ms_of_their_heartbeat(
         sent = rover.beat(armed=armed, custom_mode=custom_mode)
         line = gate.wait_for(partial(says, armed, mode), after=sent)
         late.append(line.at - sent)
-    assert min(late) < 0.05
+    assert in_time(min(late), 0.05)
     assert [line.status["seq"] for line in gate.lines] == list(range(len(gate.lines)))
     assert gate.stop() == 0
     assert not any("Traceback" in line for line in gate.log)
@@ -86,7 +87,8 @@ def test_a_lost_link_makes_everything_unknown_after_3_5_s_and_the_lines_keep_com
     last = rover.beat(armed=True, custom_mode=10)
     gate.wait_for(lambda s: s["drives_powered"] is True)
     lost = gate.wait_for(lambda s: s["link"]["state"] == "LOST")
-    assert 3.4 < lost.at - last < 3.8
+    assert lost.at - last > 3.4
+    assert in_time(lost.at - last - 3.5, 0.3)
     status = lost.status
     fields = ("mode", "e_stopped", "drives_powered", "motion_possible", "in_motion", "in_error", "error_code")
     assert [status[f] for f in fields] == ["UNKNOWN", None, None, None, None, None, 0]
@@ -94,26 +96,26 @@ def test_a_lost_link_makes_everything_unknown_after_3_5_s_and_the_lines_keep_com
     assert status["vehicle"] == {
         "autopilot": "ARDUPILOTMEGA", "type": "GROUND_ROVER", "flight_mode": None, "custom_mode": None, "state": None,
     }  # fmt: skip
-    gate.wait_for(lambda s: s["link"]["heartbeat_age"] > 4.2)
-    while_lost = [line for line in gate.lines if line.at > lost.at]
-    assert 4 <= len(while_lost) <= 12  # 0.7 s at 10 Hz
+    assert gate.wait_for_lines(6, after=lost.at).stamp - lost.stamp > 0.4  # at 10 Hz
     again = rover.beat()
     back = gate.wait_for(lambda s: s["link"]["state"] == "CONNECTED", after=again)
-    assert back.at - again < 1.0
+    assert in_time(back.at - again, 1.0)
     assert back.status["drives_powered"] is True
     for line in gate.lines:
         validate(line.status)
 
 
 @pytest.mark.parametrize(("arguments", "rate"), [((), 10.0), (("--rate", "2"), 2.0)])
-def test_lines_come_at_the_rate(
+def test_lines_keep_the_chosen_rate(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire], arguments: tuple[str, ...], rate: float
 ) -> None:
     gate = gateway("udpin:127.0.0.1:0", *arguments)
     wire(gate.address).beating()
     gate.wait_for(lambda s: s["seq"] >= 4)
-    periods = [b.at - a.at for a, b in pairwise(gate.lines)]
-    assert sorted(periods)[len(periods) // 2] == pytest.approx(1 / rate, rel=0.3)
+    periods = sorted(b.stamp - a.stamp for a, b in pairwise(gate.lines))
+    period = periods[len(periods) // 2]
+    assert period > 0.7 / rate
+    assert in_time(period, 1.3 / rate)
 
 
 def test_changes_only_gives_a_line_for_each_change_and_no_other(
@@ -122,15 +124,18 @@ def test_changes_only_gives_a_line_for_each_change_and_no_other(
     gate = gateway("udpin:127.0.0.1:0", "--changes-only")
     rover = wire(gate.address).beating()
     gate.wait_for(lambda s: s["mode"] == "MANUAL")
-    rover.wait_for("ROBOT_STATUS", after=time.monotonic() + 0.8)
-    assert len(gate.lines) == 1
+    rover.wait_for("ROBOT_STATUS", after=time.monotonic(), count=2)  # one a second, whatever changes
     rover.beat(custom_mode=10)
     gate.wait_for(lambda s: s["mode"] == "AUTO")
+    assert all(timeless(a) != timeless(b) for a, b in pairwise(gate.lines))
 
 
-def test_two_vehicles_on_one_port_have_a_handle_each(
-    gateway: Callable[..., Gateway], wire: Callable[..., Wire]
-) -> None:
+def timeless(line: Line) -> dict[str, Any]:
+    """What counts as a change."""
+    return {**line.status, "stamp": "", "seq": 0, "link": line.status["link"]["state"]}
+
+
+def test_two_vehicles_on_one_port_have_two_handles(gateway: Callable[..., Gateway], wire: Callable[..., Wire]) -> None:
     gate = gateway("udpin:127.0.0.1:0")
     wire(gate.address, system=7).beat()
     gate.wait_for(lambda s: s["system"] == 7)
@@ -141,7 +146,7 @@ def test_two_vehicles_on_one_port_have_a_handle_each(
     assert {line.status["handle"] for line in gate.lines if line.status["system"] == 7} == {HANDLE}
 
 
-def test_the_chosen_system_speaks_from_the_start_and_others_are_ignored(
+def test_the_chosen_system_has_lines_from_the_start_and_others_are_ignored(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire], validate: Callable[[Any], None]
 ) -> None:
     gate = gateway("udpin:127.0.0.1:0", "--system", "5")

@@ -1,4 +1,4 @@
-"""The page's server through the installed command: what it serves, what it refuses, and that it costs nothing."""
+"""The web server of the installed command: what it serves, what it refuses, and what it costs."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ from typing import Any
 
 import pytest
 
+from ..deadline import SOON, allow, in_time, wait_until
 from .gateway_process import Gateway, run
 from .wire import Wire
 
 PAGE = ("udpin:127.0.0.1:0", "--http", "127.0.0.1:0")
 CLIENTS = 200
 ROUNDS = 150
-"""Changes of which the latency is measured."""
+"""Changes for which the latency is measured."""
 
 
 def url(gate: Gateway) -> str:
@@ -35,12 +36,12 @@ def url(gate: Gateway) -> str:
 
 def get(address: str, **headers: str) -> Any:
     asked = urllib.request.Request(address, headers=headers)
-    with urllib.request.urlopen(asked, timeout=8) as answer:
+    with urllib.request.urlopen(asked, timeout=allow(SOON)) as answer:
         return json.loads(answer.read())
 
 
 def events(gate: Gateway, ended: ExitStack, query: str = "") -> Iterator[tuple[str, Any]]:
-    stream = ended.enter_context(urllib.request.urlopen(f"{url(gate)}/events{query}", timeout=8))
+    stream = ended.enter_context(urllib.request.urlopen(f"{url(gate)}/events{query}", timeout=allow(SOON)))
     name = ""
     for raw in stream:
         if raw.startswith(b"event: "):
@@ -49,7 +50,7 @@ def events(gate: Gateway, ended: ExitStack, query: str = "") -> Iterator[tuple[s
             yield name, json.loads(raw[6:])
 
 
-def test_the_page_tells_what_the_lines_tell(
+def test_the_page_has_the_values_of_the_lines(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire], validate: Callable[[Any], None]
 ) -> None:
     gate = gateway(*PAGE)
@@ -77,10 +78,10 @@ def test_an_arming_is_an_event_within_a_second(
     assert next(stream)[0] == "board"
     armed = rover.beat(armed=True)
     next(1 for name, data in stream for line in data["vehicles"] if line["drives_powered"])
-    assert time.monotonic() - armed < 1.0
+    assert in_time(time.monotonic() - armed, 1.0)
 
 
-def test_who_looks_at_a_vehicle_is_told_why(
+def test_a_viewer_of_a_vehicle_gets_its_explanation(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire], ended: ExitStack
 ) -> None:
     gate = gateway(*PAGE)
@@ -95,7 +96,7 @@ def test_who_looks_at_a_vehicle_is_told_why(
     assert again["stamp"] > why["stamp"]
 
 
-def test_a_token_is_asked_for_and_never_told(gateway: Callable[..., Gateway], tmp_path: Path) -> None:
+def test_a_token_is_required_and_never_logged(gateway: Callable[..., Gateway], tmp_path: Path) -> None:
     token = tmp_path / "token"
     token.write_text("correct-horse-battery")
     token.chmod(0o600)
@@ -113,18 +114,18 @@ def test_a_token_is_asked_for_and_never_told(gateway: Callable[..., Gateway], tm
     [
         (
             ("--http", "0.0.0.0:8765"),
-            "http: 0.0.0.0:8765: others on the network could look: add --http-token-file FILE",
+            "http: 0.0.0.0:8765: others on the network can see the data: add --http-token-file FILE",
         ),
-        (("--http", "x"), "http: 'x' is no place to listen; write HOST:PORT, for example 127.0.0.1:8765"),
-        (("--http-open",), "--http-open is for a web page: add --http 127.0.0.1:8765"),
-        (("--http-token-file", "x"), "--http-token-file is for a web page: add --http 127.0.0.1:8765"),
+        (("--http", "x"), "http: 'x' is not an address to listen on; write HOST:PORT, for example 127.0.0.1:8765"),
+        (("--http-open",), "--http-open needs --http HOST:PORT: serve a live web page"),
+        (("--http-token-file", "x"), "--http-token-file needs --http HOST:PORT: serve a live web page"),
         (
             ("--http", "127.0.0.1:0", "--http-token-file", "/nowhere/x"),
             "/nowhere/x: cannot read the token: No such file",
         ),
     ],
 )
-def test_what_cannot_be_is_one_line(arguments: tuple[str, ...], line: str) -> None:
+def test_wrong_options_are_one_line(arguments: tuple[str, ...], line: str) -> None:
     done = run("udpin:127.0.0.1:0", *arguments)
     assert done.returncode == 2
     assert line in done.stderr.splitlines()[-1]
@@ -145,9 +146,7 @@ def test_a_recorded_log_has_no_live_page(demo_log: Path) -> None:
     assert "a recorded log has no live page; write `mav-robot-status report" in done.stderr
 
 
-def test_the_configuration_can_ask_for_the_page(
-    gateway: Callable[..., Gateway], tmp_path: Path, demo_log: Path
-) -> None:
+def test_the_configuration_can_enable_the_page(gateway: Callable[..., Gateway], tmp_path: Path, demo_log: Path) -> None:
     path = tmp_path / "page.yaml"
     path.write_text(
         "links: ['udpin:127.0.0.1:0']\n"
@@ -164,13 +163,13 @@ def test_the_configuration_can_ask_for_the_page(
 
 
 class Crowd:
-    """Many who open the event stream; every second one never reads."""
+    """Many clients of the event stream; every second one never reads."""
 
     def __init__(self, page: str, count: int) -> None:
         host, _, port = page.removeprefix("http://").rpartition(":")
         self.sockets = []
         for _ in range(count):
-            one = socket.create_connection((host, int(port)), 8)
+            one = socket.create_connection((host, int(port)), allow(SOON))
             one.sendall(b"GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n")
             self.sockets.append(one)
         self.bytes = 0
@@ -198,7 +197,7 @@ def latencies(gate: Gateway, rover: Wire) -> list[float]:
     """Milliseconds from a heartbeat that changes something to its line."""
     found = []
     for _ in range(ROUNDS):
-        time.sleep(0.06)  # no more than 20 changes a second are told
+        time.sleep(0.06)  # at most 20 changes a second are published
         gate.lines.clear()  # a long list takes long to look through
         armed = not rover.armed
         sent = rover.beat(armed=armed)
@@ -215,7 +214,8 @@ def p99(values: list[float]) -> float:
     return statistics.quantiles(values, n=100)[98]
 
 
-def test_two_hundred_listeners_half_of_them_dead_cost_no_latency_and_no_memory(
+@pytest.mark.slow
+def test_two_hundred_clients_half_of_them_dead_cost_no_latency_and_no_memory(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire], ended: ExitStack
 ) -> None:
     gate = gateway(*PAGE, "--rate", "10")
@@ -226,23 +226,21 @@ def test_two_hundred_listeners_half_of_them_dead_cost_no_latency_and_no_memory(
     before = gate.memory()
     crowd = Crowd(url(gate), CLIENTS)
     ended.callback(crowd.close)
-    time.sleep(2.0)
+    wait_until(lambda: crowd.bytes > 100 * CLIENTS)
     crowded = latencies(gate, rover)
-    time.sleep(1.0)
     grown = gate.memory() - before
     told = (
         f"latency alone p50 {statistics.median(alone):.2f} p99 {p99(alone):.2f} ms, with {CLIENTS} listeners "
         f"p50 {statistics.median(crowded):.2f} p99 {p99(crowded):.2f} ms; memory +{grown:.1f} MB"
     )
     print(told, file=sys.stderr)
-    assert crowd.bytes > 100 * CLIENTS
-    assert statistics.median(crowded) < statistics.median(alone) + 5.0, told
-    assert p99(crowded) < p99(alone) + 20.0, told  # generous: on a machine that does other things too
+    assert in_time(statistics.median(crowded) - statistics.median(alone), 5.0), told
+    assert in_time(p99(crowded) - p99(alone), 20.0), told  # other programs run on this machine, too
     assert grown < 40, told
     assert gate.stop() == 0
 
 
-def test_the_core_runs_without_the_extra() -> None:
+def test_without_the_extra_the_option_is_a_usage_error() -> None:
     script = (
         "import sys; sys.modules['aiohttp'] = None\n"
         "from mav_robot_status.cli import main\n"
@@ -250,7 +248,7 @@ def test_the_core_runs_without_the_extra() -> None:
     )
     done = subprocess.run(
         [sys.executable, "-c", script, "udpin:127.0.0.1:0", "--http", "127.0.0.1:0"],
-        capture_output=True, text=True, timeout=30,
+        capture_output=True, text=True, timeout=allow(30),
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.splitlines()[-1].endswith("the web page needs an extra: pip install 'mav-robot-status[web]'")

@@ -18,7 +18,7 @@ def test_a_stamp_is_utc_with_six_decimals() -> None:
     assert rfc3339(1_795_200_547_123_456) == "2026-11-20T18:49:07.123456Z"
 
 
-def test_a_whole_second_has_its_six_zeros() -> None:
+def test_a_whole_second_has_six_zeros() -> None:
     assert rfc3339(1_795_200_547_000_000) == "2026-11-20T18:49:07.000000Z"
 
 
@@ -29,15 +29,15 @@ def test_a_stamp_can_be_read_back(unix_us: int) -> None:
 
 
 @given(st.integers(-(1 << 70), 1 << 70))
-def test_whatever_a_log_says_gives_a_stamp(unix_us: int) -> None:
+def test_any_log_time_has_a_timestamp(unix_us: int) -> None:
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z", rfc3339(unix_us))
 
 
-def test_later_moves_both_clocks() -> None:
+def test_later_advances_both_clocks() -> None:
     assert later(Instant(10.0, 5_000_000), 0.25) == Instant(10.25, 5_250_000)
 
 
-def test_the_present_is_of_the_monotonic_and_of_the_wall_clock() -> None:
+def test_now_reads_the_monotonic_and_the_wall_clock() -> None:
     before, present, after = time.monotonic(), now(), time.monotonic()
     assert before <= present.mono <= after
     assert abs(present.unix_us / 1e6 - time.time()) < 60

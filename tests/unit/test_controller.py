@@ -1,4 +1,4 @@
-"""`IndustrialRobotStatusController`: rate, phase, change, and what a busy output costs."""
+"""`IndustrialRobotStatusController`: rate, phase, changes and busy outputs."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.controller import RETRY, IndustrialRobotStatusController
-from mav_robot_status.errors import UnknownHandleError
+from mav_robot_status.errors import ConfigError, UnknownHandleError
 from mav_robot_status.interface import (
     DEFAULT_HANDLE_NAME,
     IndustrialRobotStatusHandle,
     IndustrialRobotStatusInterface,
     Inhibit,
-    RobotHW,
+    InterfaceManager,
     RobotStatusMsg,
     TriState,
 )
@@ -29,7 +29,7 @@ PERIODIC_ONLY: Mapping[str, object] = {"publish_rate": 10, "publish_on_change": 
 
 
 class Collector:
-    """A publisher that keeps what it is given; `is_busy` is for the test to set."""
+    """A publisher that stores its messages. A test sets `is_busy`."""
 
     def __init__(self, *, periodic: bool = True) -> None:
         self.periodic = periodic
@@ -56,7 +56,7 @@ class Collector:
 
 
 class Rig:
-    """A hardware with one handle, a controller that has been started at START, and its outputs."""
+    """Hardware with one handle, a controller started at START, and its outputs."""
 
     def __init__(self, parameters: Mapping[str, object], *outputs: Collector) -> None:
         self.handle = IndustrialRobotStatusHandle(DEFAULT_HANDLE_NAME)
@@ -81,13 +81,13 @@ class Rig:
         return self.controller.next_due(START.mono + at) - START.mono
 
 
-def hardware(*handles: IndustrialRobotStatusHandle) -> RobotHW:
+def hardware(*handles: IndustrialRobotStatusHandle) -> InterfaceManager:
     interface = IndustrialRobotStatusInterface()
     for handle in handles:
         interface.register_handle(handle)
-    hw = RobotHW()
-    hw.register_interface(interface)
-    return hw
+    interfaces = InterfaceManager()
+    interfaces.register_interface(interface)
+    return interfaces
 
 
 def steps(seconds: float, step: float) -> Iterable[float]:
@@ -97,14 +97,14 @@ def steps(seconds: float, step: float) -> Iterable[float]:
 # -- init ----------------------------------------------------------------------------------------------------------
 
 
-def test_the_defaults_are_ten_hertz_on_change_and_the_usual_handle() -> None:
+def test_the_defaults_are_ten_hertz_on_change_and_the_default_handle() -> None:
     rig = Rig({})
     assert rig.controller.publish_rate == 10.0
     assert rig.controller.publish_on_change
     assert rig.controller.handle is rig.handle
 
 
-def test_each_default_that_is_used_is_announced_in_the_log(caplog: pytest.LogCaptureFixture) -> None:
+def test_each_default_in_use_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     Rig({})
     assert [record.getMessage() for record in caplog.records] == [
@@ -113,14 +113,31 @@ def test_each_default_that_is_used_is_announced_in_the_log(caplog: pytest.LogCap
     ]
 
 
-def test_nothing_is_announced_if_everything_is_set(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize(
+    ("parameters", "found"),
+    [
+        ({"publish_rate": "fast"}, "publish_rate: must be a number of Hz, not 'fast'"),
+        ({"publish_rate": True}, "publish_rate: must be a number of Hz, not True"),
+        ({"publish_rate": math.nan}, "publish_rate: must be a number of Hz, not nan"),
+        ({"publish_rate": math.inf}, "publish_rate: must be a number of Hz, not inf"),
+        ({"handle_name": 7}, "handle_name: must be a text, not 7"),
+        ({"publish_on_change": "no"}, "publish_on_change: must be true or false, not 'no'"),
+    ],
+)
+def test_a_parameter_of_the_wrong_type_is_an_error_that_names_it(parameters: dict[str, object], found: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        Rig(parameters)
+    assert str(error.value) == found
+
+
+def test_nothing_is_logged_if_every_parameter_is_set(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     rig = Rig({"publish_rate": 2, "handle_name": DEFAULT_HANDLE_NAME})
     assert rig.controller.publish_rate == 2.0
     assert not caplog.records
 
 
-def test_an_unknown_handle_is_an_error_that_lists_the_names_there_are() -> None:
+def test_an_unknown_handle_is_an_error_that_lists_the_known_names() -> None:
     hw = hardware(IndustrialRobotStatusHandle("rover"), IndustrialRobotStatusHandle("copter"))
     with pytest.raises(UnknownHandleError, match="no handle 'boat'; registered: 'rover', 'copter'"):
         IndustrialRobotStatusController().init(hw, {"handle_name": "boat"}, ())
@@ -129,7 +146,7 @@ def test_an_unknown_handle_is_an_error_that_lists_the_names_there_are() -> None:
 # -- the message ---------------------------------------------------------------------------------------------------
 
 
-def test_a_message_is_stamped_with_the_time_of_the_update_and_says_whose_it_is() -> None:
+def test_a_message_has_the_time_of_the_update_and_the_name_of_its_handle() -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.change(7)
     rig.handle.heard_at = START.mono
@@ -140,7 +157,7 @@ def test_a_message_is_stamped_with_the_time_of_the_update_and_says_whose_it_is()
     assert msg.heartbeat_age == pytest.approx(0.25)
 
 
-def test_a_robot_that_was_never_heard_has_no_age() -> None:
+def test_a_robot_without_a_heartbeat_has_no_age() -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.update(0.25)
     assert rig.out.messages[0].heartbeat_age is None
@@ -151,7 +168,7 @@ def test_a_robot_that_was_never_heard_has_no_age() -> None:
 
 def test_the_rate_gate_keeps_its_phase_over_a_thousand_updates_at_odd_times() -> None:
     rig = Rig(PERIODIC_ONLY)
-    times = [0.0137 * i for i in range(1, 1001)]  # 13.7 s, no divisor of the period
+    times = [0.0137 * i for i in range(1, 1001)]  # 13.7 s, not a divisor of the period
     rig.update(*times)
     expected = [next(t for t in times if t > n * 0.1 + 1e-9) for n in range(1, 137)]
     assert rig.out.times == pytest.approx(expected)
@@ -165,7 +182,7 @@ def test_a_message_is_due_strictly_later_than_a_period_after_the_last() -> None:
     assert len(rig.out.messages) == 1
 
 
-def test_no_message_comes_before_the_first_period_is_over() -> None:
+def test_no_message_is_published_before_the_first_period_ends() -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.update(0.0, 0.03, 0.06, 0.09)
     assert not rig.out.messages
@@ -179,7 +196,7 @@ def test_nothing_is_published_periodically_at_a_rate_of_zero_or_less(rate: float
     assert rig.next_due(100) == math.inf
 
 
-def test_changes_still_come_at_a_rate_of_zero() -> None:
+def test_changes_are_published_at_a_rate_of_zero() -> None:
     rig = Rig({"publish_rate": 0})
     rig.update(0.0, 1.0)
     rig.change(1)
@@ -187,7 +204,7 @@ def test_changes_still_come_at_a_rate_of_zero() -> None:
     assert rig.out.times == [0.0, 2.0]
 
 
-def test_an_output_that_wants_no_periodic_messages_gets_none() -> None:
+def test_an_output_that_is_not_periodic_gets_no_periodic_messages() -> None:
     periodic, changes = Collector(), Collector(periodic=False)
     rig = Rig({"publish_rate": 10}, periodic, changes)
     rig.update(*steps(1, 0.15))
@@ -207,13 +224,13 @@ def test_the_phase_survives_a_stall() -> None:
     assert rig.out.times == [0.11, 5.03, 5.11, 5.21]
 
 
-def test_a_rate_beyond_reason_after_a_stall_does_no_harm() -> None:
+def test_an_absurd_rate_after_a_stall_is_harmless() -> None:
     rig = Rig({"publish_rate": 1e308, "publish_on_change": False})
     rig.update(1.0, 500.0, 500.1)
     assert len(rig.out.messages) == 3
 
 
-def test_starting_again_begins_the_phase_anew() -> None:
+def test_starting_again_restarts_the_phase() -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.update(0.11)
     rig.controller.stopping(later(START, 0.15))
@@ -226,7 +243,7 @@ def test_starting_again_begins_the_phase_anew() -> None:
 # -- busy outputs --------------------------------------------------------------------------------------------------
 
 
-def test_a_busy_output_is_skipped_and_asked_again_at_the_next_update_without_moving_the_phase() -> None:
+def test_a_busy_output_is_skipped_and_retried_at_the_next_update_without_moving_the_phase() -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.out.is_busy = True
     rig.update(0.11, 0.13)
@@ -237,7 +254,7 @@ def test_a_busy_output_is_skipped_and_asked_again_at_the_next_update_without_mov
     assert rig.out.times == [0.15, 0.21]
 
 
-def test_what_was_skipped_is_counted_and_told_at_the_end(caplog: pytest.LogCaptureFixture) -> None:
+def test_skipped_messages_are_counted_and_logged_at_the_end(caplog: pytest.LogCaptureFixture) -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.out.is_busy = True
     rig.update(0.11, 0.12, 0.13)
@@ -245,14 +262,14 @@ def test_what_was_skipped_is_counted_and_told_at_the_end(caplog: pytest.LogCaptu
     assert caplog.messages == [f"{DEFAULT_HANDLE_NAME}: an output was busy 1 times, and messages were skipped"]
 
 
-def test_nothing_is_told_at_the_end_if_nothing_was_skipped(caplog: pytest.LogCaptureFixture) -> None:
+def test_nothing_is_logged_at_the_end_without_skipped_messages(caplog: pytest.LogCaptureFixture) -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.update(0.11)
     rig.controller.stopping(later(START, 1))
     assert not caplog.messages
 
 
-def test_a_busy_output_does_not_hold_up_another() -> None:
+def test_a_busy_output_does_not_delay_another() -> None:
     slow, quick = Collector(), Collector()
     rig = Rig(PERIODIC_ONLY, slow, quick)
     slow.is_busy = True
@@ -261,7 +278,7 @@ def test_a_busy_output_does_not_hold_up_another() -> None:
     assert not slow.messages
 
 
-def test_a_change_during_which_an_output_was_busy_is_published_after_it() -> None:
+def test_a_change_while_an_output_is_busy_is_published_afterwards() -> None:
     rig = Rig({"publish_rate": 0})
     rig.update(0.0)
     rig.out.is_busy = True
@@ -294,12 +311,12 @@ def test_a_change_is_published_at_once_and_only_once() -> None:
 def test_a_change_of_the_detail_is_a_change() -> None:
     rig = Rig({})
     rig.update(0.0)
-    rig.handle.detail = rig.handle.detail._replace(inhibits=(Inhibit(1, "DISARMED", None, 0),))
+    rig.handle.detail = rig.handle.detail._replace(inhibits=(Inhibit("DISARMED", None, 0),))
     rig.update(0.03)
     assert len(rig.out.messages) == 2
 
 
-def test_an_equal_status_that_is_set_again_is_no_change() -> None:
+def test_setting_an_equal_status_is_not_a_change() -> None:
     rig = Rig({"publish_rate": 0})
     rig.change(1)
     rig.update(0.0)
@@ -308,7 +325,7 @@ def test_an_equal_status_that_is_set_again_is_no_change() -> None:
     assert rig.out.times == [0.0]
 
 
-def test_the_age_of_the_heartbeat_is_no_change() -> None:
+def test_the_age_of_the_heartbeat_is_not_a_change() -> None:
     rig = Rig({"publish_rate": 0})
     rig.update(0.0)
     rig.handle.heard_at = START.mono + 0.02
@@ -316,7 +333,7 @@ def test_the_age_of_the_heartbeat_is_no_change() -> None:
     assert rig.out.times == [0.0]
 
 
-def test_changes_are_not_published_if_they_are_not_wanted() -> None:
+def test_changes_are_not_published_if_that_is_disabled() -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.change(1)
     rig.update(0.05)
@@ -347,7 +364,7 @@ def test_at_most_twenty_changes_are_published_in_any_second_and_the_last_state_a
     assert rig.next_due(at) == math.inf
 
 
-def test_a_flood_of_changes_leaves_the_periodic_messages_alone() -> None:
+def test_a_flood_of_changes_does_not_affect_the_periodic_messages() -> None:
     rig = Rig({})
     for i, at in enumerate(steps(2, 0.01)):
         rig.change(i + 1)
@@ -375,13 +392,13 @@ def test_several_controllers_read_one_handle_each_at_its_own_rate() -> None:
     assert {rate: len(out.messages) for rate, out in outputs.items()} == {1.0: 2, 5.0: 10, 20.0: 40}
 
 
-def test_all_outputs_of_one_update_are_handed_the_same_message() -> None:
+def test_all_outputs_of_one_update_get_the_same_message() -> None:
     one, other = Collector(), Collector()
     Rig(PERIODIC_ONLY, one, other).update(0.11)
     assert one.messages[0] is other.messages[0]
 
 
-def test_a_controller_of_each_of_two_handles_publishes_its_own() -> None:
+def test_two_controllers_publish_their_own_handles() -> None:
     rover, copter = IndustrialRobotStatusHandle("rover"), IndustrialRobotStatusHandle("copter")
     hw, out = hardware(rover, copter), Collector()
     for handle in (rover, copter):
@@ -395,7 +412,7 @@ def test_a_controller_of_each_of_two_handles_publishes_its_own() -> None:
 # -- next_due --------------------------------------------------------------------------------------------------------
 
 
-def test_an_update_at_the_time_that_next_due_names_publishes() -> None:
+def test_an_update_at_the_time_of_next_due_publishes() -> None:
     rig = Rig(PERIODIC_ONLY)
     at = START.mono
     for n in range(1, 50):
@@ -422,10 +439,10 @@ def test_next_due_is_never_in_the_past(rate: float, on_change: bool, life: Seque
 
 
 @given(st.floats(0.1, 100), st.lists(st.floats(0.001, 0.999), min_size=1, max_size=300))
-def test_the_number_of_periodic_messages_is_that_of_the_elapsed_periods_unless_stalled(
+def test_the_number_of_periodic_messages_equals_the_elapsed_periods_without_a_stall(
     rate: float, waits: Sequence[float]
 ) -> None:
-    """Updates never further apart than a period, at any times: not one message is lost or doubled."""
+    """Updates at any times, at most a period apart: no message is lost or duplicated."""
     rig = Rig({"publish_rate": rate, "publish_on_change": False, "handle_name": DEFAULT_HANDLE_NAME})
     at = 0.0
     for wait in waits:
@@ -435,7 +452,7 @@ def test_the_number_of_periodic_messages_is_that_of_the_elapsed_periods_unless_s
 
 
 @given(st.floats(0.1, 100), st.lists(st.floats(0, 30), max_size=100))
-def test_however_updates_come_there_are_never_more_messages_than_periods(rate: float, waits: Sequence[float]) -> None:
+def test_any_updates_give_at_most_one_message_a_period(rate: float, waits: Sequence[float]) -> None:
     rig = Rig({"publish_rate": rate, "publish_on_change": False, "handle_name": DEFAULT_HANDLE_NAME})
     at = 0.0
     for wait in waits:

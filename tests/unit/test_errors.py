@@ -1,4 +1,4 @@
-"""The errors that a person can act on."""
+"""The errors that a user can correct."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from mav_robot_status.errors import ConfigError, LinkError, MavRobotStatusError,
     ("error", "exit_code"),
     [(MavRobotStatusError, 1), (LinkError, 1), (UsageError, 2), (ConfigError, 2), (UnknownHandleError, 2)],
 )
-def test_each_error_has_the_exit_code_that_users_were_told(error: type[MavRobotStatusError], exit_code: int) -> None:
+def test_each_error_has_its_documented_exit_code(error: type[MavRobotStatusError], exit_code: int) -> None:
     assert error.exit_code == exit_code
     assert issubclass(error, MavRobotStatusError)
 
 
-def test_who_catches_usage_errors_also_gets_those_of_the_configuration() -> None:
+def test_a_configuration_error_is_a_usage_error() -> None:
     assert issubclass(ConfigError, UsageError)

@@ -1,4 +1,4 @@
-"""The fuzz targets hold on their corpus and on what hypothesis finds, and they fail where they should."""
+"""The fuzz targets pass on their corpus and on inputs of hypothesis, and they fail on a defect."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CORPUS = Path(fuzz.targets.__file__).parent / "corpus"
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_a_target_has_a_corpus_and_holds_on_it_and_on_mutations_of_it(name: str) -> None:
+def test_every_target_accepts_its_corpus_and_mutations_of_it(name: str) -> None:
     corpus = [path.read_bytes() for path in sorted((CORPUS / name).iterdir())]
     assert corpus
     for data in itertools.islice(inputs(corpus, (), 3), 40):
@@ -28,11 +28,11 @@ def test_a_target_has_a_corpus_and_holds_on_it_and_on_mutations_of_it(name: str)
 @pytest.mark.parametrize("name", TARGETS)
 @settings(max_examples=40)
 @given(data=st.binary(max_size=600))
-def test_a_target_holds_on_any_bytes(name: str, data: bytes) -> None:
+def test_every_target_accepts_any_bytes(name: str, data: bytes) -> None:
     assert TARGETS[name](data) > 0
 
 
-def test_the_mutator_gives_the_same_inputs_for_the_same_seed_and_bounded_ones() -> None:
+def test_the_mutator_returns_bounded_inputs_that_are_reproducible_from_a_seed() -> None:
     corpus = [b"abc" * 500, b"\xfd\x00"]
     first = list(itertools.islice(inputs(corpus, (b"word",), 1), 500))
     assert first == list(itertools.islice(inputs(corpus, (b"word",), 1), 500))
@@ -40,7 +40,7 @@ def test_the_mutator_gives_the_same_inputs_for_the_same_seed_and_bounded_ones() 
     assert max(map(len, first)) <= MOST_BYTES
 
 
-def test_a_parser_that_grows_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_parser_that_grows_without_bound_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Parser, "pending", 281)
     with pytest.raises(AssertionError):
         TARGETS["framing"](b"any")

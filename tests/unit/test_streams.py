@@ -23,7 +23,7 @@ def pipe() -> Iterator[tuple[int, TextIO]]:
     os.close(read)
 
 
-def test_a_log_line_goes_to_its_reader(pipe: tuple[int, TextIO]) -> None:
+def test_a_log_line_is_written_to_the_stream(pipe: tuple[int, TextIO]) -> None:
     StderrHandler(pipe[1]).emit(RECORD)
     assert os.read(pipe[0], 100) == b"hello\n"
 
@@ -35,22 +35,22 @@ def test_a_full_pipe_loses_log_lines_and_does_not_block(pipe: tuple[int, TextIO]
     assert b"hello" not in os.read(pipe[0], 1 << 20)
 
 
-def test_a_stream_without_a_descriptor_is_written_to_as_it_is() -> None:
+def test_a_stream_without_a_descriptor_is_written_to_directly() -> None:
     stream = io.StringIO()
     StderrHandler(stream).emit(RECORD)
     assert stream.getvalue() == "hello\n"
 
 
-def test_complaining_to_nobody_is_harmless(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_message_without_a_stream_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     read, write = os.pipe()
     os.close(read)
     with open(write, "w", encoding="utf-8") as stream:
         monkeypatch.setattr(sys, "stderr", stream)
-        complain("nobody hears this")
+        complain("lost")
         assert os.readlink(f"/proc/self/fd/{write}") == os.devnull
 
 
-def test_a_detached_stream_leads_nowhere(pipe: tuple[int, TextIO]) -> None:
+def test_a_detached_stream_leads_to_dev_null(pipe: tuple[int, TextIO]) -> None:
     detach(pipe[1])
     pipe[1].write("lost")
     pipe[1].flush()

@@ -1,6 +1,6 @@
-"""Statuses over MQTT: one connection for each robot, events that wait on disk, and the board that reads them all.
+"""Statuses over MQTT: one connection for each robot, undelivered events on disk, and the fleet page that reads them.
 
-From the top: `publisher` hands over to `courier`, a thread of its own, which has a `robot` for each name and the
-`spool`; `journal` keeps what is on its way there; `connection` and `loop` turn paho's clients, `client` makes them,
-`complaints` says what is wrong; `fleet` is the other end. docs/mqtt.md: what is on the topics.
+`publisher` hands messages to `worker`, which has its own thread, a `robot` for each name, and the `spool`. `journal`
+holds an event until the spool has it. `connection` and `loop` run the clients of paho, `client` makes them, and
+`error_reporter` logs their errors. `fleet` reads the published topics. docs/reference/mqtt.md describes the topics.
 """

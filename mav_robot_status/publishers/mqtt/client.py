@@ -1,4 +1,4 @@
-"""A client of paho's as a connection needs it: made for a broker, opened, shut."""
+"""The paho client of one connection: create, connect, close."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
-from .complaints import unreachable
+from .error_reporter import unreachable
 from .options import VERSIONS
 
 if TYPE_CHECKING:
-    from .options import Broker
+    from .settings import Broker
 
 MOST_IN_FLIGHT: Final = 10
-"""Publications that the broker has not acknowledged, at most; what is more waits in the client. Brokers allow 10 at the
-least (HiveMQ), mosquitto 20."""
+"""The limit on publications without an acknowledgement. Further ones wait in the client. HiveMQ allows 10, mosquitto
+20."""
 
 
 class Will(NamedTuple):
-    """What the broker says for us when we are gone."""
+    """The message that the broker publishes if the connection breaks."""
 
     topic: str
     text: str
 
 
 def make(broker: Broker, ident: str, will: Will | None) -> Client:
-    """A client that is not connected yet, and calls nobody."""
+    """A client without callbacks that is not connected yet."""
     client = Client(
         CallbackAPIVersion.VERSION2,
         ident,
@@ -46,19 +46,19 @@ def make(broker: Broker, ident: str, will: Will | None) -> Client:
 
 
 def dial(client: Client, broker: Broker) -> str | None:
-    """Open the connection, which may take long; why it cannot be."""
+    """Open the connection. This may block for long. Return the reason of a failure, or None."""
     try:
         client.connect(broker.host, broker.port, broker.keepalive)
         sock: Any = client.socket()
         if sock is not None:
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, broker.keepalive * 1000)
-    except Exception as error:  # the network's, and whatever paho raises for an answer that is none
+    except Exception as error:  # network errors, and whatever paho raises for an invalid answer
         return unreachable(error)
     return None
 
 
 def shut(client: Client) -> None:
-    """End it as if the line were cut."""
+    """Close the socket without a DISCONNECT."""
     sock = client.socket()
     if sock is not None:
         sock.close()

@@ -1,4 +1,4 @@
-"""One MQTT connection: opened in a helper thread, and again after it was lost, with the reason in words."""
+"""One MQTT connection. A helper thread opens it, and opens it again after a loss. Each failure has a reason."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from .client import dial, make, shut
-from .complaints import lost, refusal, words
+from .error_reporter import lost, refusal, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,42 +19,42 @@ if TYPE_CHECKING:
     from paho.mqtt.reasoncodes import ReasonCode
 
     from .client import Will
-    from .complaints import Complaints
-    from .options import Broker
+    from .error_reporter import ErrorReporter
+    from .settings import Broker
 
-FIRST_WAIT, LONGEST_WAIT = 1.0, 30.0  # s between two attempts; doubled each time, and spread
-STEADY: Final = 10.0  # s that a connection has to hold for the next wait to be the first one
+FIRST_WAIT, LONGEST_WAIT = 1.0, 30.0  # s between two attempts; doubled each time, with jitter
+STEADY: Final = 10.0  # s after which a connection counts as steady and the wait is reset
 ANSWER: Final = 10.0  # s for a broker to answer
-MOST_AT_ONCE: Final = 200  # packets read before others have their turn
+MOST_AT_ONCE: Final = 200  # packets read before the next connection is served
 
 
 class Owner(Protocol):
-    """Who uses a connection. Everything is called in the loop's thread."""
+    """The callbacks of a connection. All of them run in the loop's thread."""
 
     def opened(self) -> None:
-        """The broker has let us in."""
+        """The broker has accepted the connection."""
 
     def lost(self) -> None:
-        """What was not acknowledged by now is not delivered."""
+        """The connection is lost. Publications without an acknowledgement are not delivered."""
 
     def acknowledged(self, mid: int, refused: str | None) -> None:
-        """The broker has taken a publication, or a subscription, or says why not."""
+        """The broker has acknowledged a publication or a subscription. `refused` is the reason of a refusal."""
 
     def received(self, message: MQTTMessage) -> None:
-        """A publication of others."""
+        """A message of a subscribed topic has arrived."""
 
 
 class Connection:
     """One client of a broker."""
 
-    def __init__(self, broker: Broker, ident: str, will: Will | None, owner: Owner, complaints: Complaints) -> None:
-        """`ident` stays the same for the same robot: the broker then ends what is left of an older connection first."""
+    def __init__(self, broker: Broker, ident: str, will: Will | None, owner: Owner, errors: ErrorReporter) -> None:
+        """`ident` is the same for each connection of a robot, so that the broker first closes an older connection."""
         self._broker, self._ident, self._will, self._owner = broker, ident, will, owner
-        self._complaints = complaints
+        self._errors = errors
         self._client: Client | None = None
         self._wait, self._due = FIRST_WAIT, 0.0
         self._since: float | None = None
-        """When this attempt began, or the connection was opened."""
+        """When this attempt began, or when the connection was opened."""
         self.open = False
         self.dialling = False
         self._reason = ""
@@ -67,7 +67,7 @@ class Connection:
 
     @property
     def wants_write(self) -> bool:
-        """Whether something could not be written yet."""
+        """Whether data waits for the socket."""
         return self._client is not None and not self.dialling and self._client.want_write()
 
     def due(self, now: float) -> bool:
@@ -75,20 +75,20 @@ class Connection:
         return self._client is None and not self._closed and now >= self._due
 
     def dial(self) -> Callable[[], str | None]:
-        """Begin an attempt: what is returned is to be called in another thread, and `dialled` told its result."""
+        """Begin an attempt. Call the returned function in another thread and pass its result to `dialled`."""
         self.dialling = True
         self._client = client = self._make()
         return lambda: dial(client, self._broker)
 
     def dialled(self, reason: str | None, now: float) -> None:
-        """The helper thread is done; `reason` is why it could not be."""
+        """The helper thread has finished. `reason` is the reason of a failure, or None."""
         self.dialling = False
         self._since = now
         if reason is not None or self._closed:
             self._end(now, reason or "closed")
 
     def turn(self, now: float) -> None:
-        """Once a second: keep it alive, give up what does not answer."""
+        """Call this once a second: it sends pings and closes a connection without an answer."""
         if self._client is None or self.dialling or self._since is None:
             return
         if not self.open and now - self._since > ANSWER:
@@ -97,22 +97,22 @@ class Connection:
         if self.open and not self._steady and now - self._since >= STEADY:
             self._steady = True
             self._wait = FIRST_WAIT
-            self._complaints.holds()
+            self._errors.holds()
         self._run(self._client.loop_misc, now)
 
     def readable(self, now: float) -> None:
-        """Take what came."""
+        """Read the data on the socket."""
         for _ in range(MOST_AT_ONCE):
             if self._client is None or not self._run(self._client.loop_read, now) or not self._more():
                 return
 
     def writable(self, now: float) -> None:
-        """Write what waits."""
+        """Write the data that waits."""
         if self._client is not None:
             self._run(self._client.loop_write, now)
 
     def publish(self, topic: str, text: str, qos: int, retain: bool = False, expiry: int | None = None) -> int:
-        """Hand to the broker; the number under which it is acknowledged. `expiry` (s) is for MQTT 5 only."""
+        """Publish a text; return the message id of its acknowledgement. `expiry` (s) needs MQTT 5."""
         assert self._client is not None
         properties = None
         if expiry is not None and self._broker.version == "5":
@@ -121,25 +121,25 @@ class Connection:
         return self._client.publish(topic, text.encode(), qos, retain, properties).mid
 
     def subscribe(self, topics: list[tuple[str, int]]) -> None:
-        """Ask for topics, each with a quality of service."""
+        """Subscribe to topics, each with its quality of service."""
         assert self._client is not None
         self._client.subscribe(topics)
 
     def drop(self, reason: str) -> None:
-        """End it as if the line were cut, and try again later. Only in a callback of the owner."""
+        """Close the socket without a DISCONNECT and try again later. Only for callbacks of the owner."""
         self._reason, self._dropped = reason, True
 
     def leave(self) -> None:
-        """Tell the broker that we go, so that it does not say the will.
+        """Send a DISCONNECT, so that the broker does not publish the will.
 
-        Only when nothing is on its way any more: an answer that comes after this would reset the connection.
+        Call this only when no acknowledgement is pending: one that arrives later would reset the connection.
         """
         self._closed = True
         if self._client is not None and self.open:
             self._client.disconnect()
 
     def close(self) -> None:
-        """End it for good, as it is."""
+        """Close the socket and do not try again."""
         self._closed = True
         if self._client is not None and not self.dialling:
             shut(self._client)
@@ -169,23 +169,23 @@ class Connection:
         self._owner.acknowledged(mid, next(filter(None, map(refusal, codes)), None))
 
     def _run(self, step: Callable[[], Any], now: float) -> bool:
-        """One of paho's steps; False if that was the end of the connection."""
+        """Run a step of paho. False if the connection has ended."""
         was_open = self.open
         try:
             fine = step() == MQTT_ERR_SUCCESS
-        except Exception as error:  # whatever a peer's bytes make paho raise
-            fine, self._reason = False, f"what comes is no MQTT ({type(error).__name__})"
+        except Exception as error:  # whatever paho raises for the bytes of a peer
+            fine, self._reason = False, f"the answer is not MQTT ({type(error).__name__})"
         if not fine or self._dropped or self._client is None or self._client.socket() is None:
             self._end(now, self._reason or lost(self._broker, self.open, self._steady))
             return False
         if self.open and not was_open:
             self._since = now
-            self._complaints.opens()
+            self._errors.opens()
             self._owner.opened()
         return True
 
     def _more(self) -> bool:
-        """Whether TLS has decrypted more than was read."""
+        """Whether TLS has decrypted data that is not read yet."""
         sock = self.socket
         return isinstance(sock, ssl.SSLSocket) and sock.pending() > 0
 
@@ -199,6 +199,6 @@ class Connection:
         self._steady = False
         self._reason, self._dropped = "", False
         if not self._closed:
-            self._complaints.fails(reason)
+            self._errors.fails(reason)
         if was_open:
             self._owner.lost()

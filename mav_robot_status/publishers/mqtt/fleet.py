@@ -1,8 +1,8 @@
-"""What a broker says of all robots, as lines for a board: a status only counts while somebody stands for it.
+"""The topics of all robots, as lines for a board. A status counts only while its robot is online and publishes.
 
-A status is believed while its robot's connection is ONLINE and it renews itself: two that differ came, the later one
-within the keep-alive. So neither what a broker retained, nor what a bridge or a restarted broker brings up again, is
-ever shown as current, whatever the clocks say. Values in, values out.
+A status is live while its robot's connection is ONLINE and statuses arrive: at least two that differ, the later one
+within the keep-alive. A retained status, or an old one from a bridge or a restarted broker, is therefore never shown
+as current. This does not depend on any clock of a peer. No I/O.
 """
 
 from __future__ import annotations
@@ -21,34 +21,34 @@ if TYPE_CHECKING:
 MOST_ROBOTS: Final = 4096
 LONGEST: Final = 65_536  # bytes of a status or an event
 WHY: Final = {
-    ONLINE: "the gateway says nothing new",
-    OFFLINE: "the gateway was ended",
+    ONLINE: "the gateway publishes nothing new",
+    OFFLINE: "the gateway was stopped",
     BROKEN: "the gateway is gone",
 }
-NO_WORD: Final = "no gateway has said that it is there"
+NOT_ONLINE: Final = "no gateway is online"
 
 
 class _Robot:
-    """What is known of one robot."""
+    """The state of one robot."""
 
     __slots__ = ("at", "line", "live", "mark", "session", "seq", "state")  # noqa: RUF023
 
     def __init__(self) -> None:
         self.state = ""
-        """Of its connection."""
+        """The state of its connection."""
         self.line: dict[str, Any] = {}
         self.mark: tuple[Any, Any] = (None, None)
         """Stamp and seq of the latest status."""
         self.at = -math.inf
-        """When (monotonic seconds) that came."""
+        """When (monotonic seconds) that status arrived."""
         self.live = False
-        """Whether it is believed."""
+        """Whether its status is shown as current."""
         self.session, self.seq = "", 0
-        """Of its last event."""
+        """Session and number of its last event."""
 
 
 class Fleet:
-    """All robots below a prefix."""
+    """All robots under a topic prefix."""
 
     def __init__(self, prefix: str, keepalive: float) -> None:
         self._start = f"{prefix}/"
@@ -56,19 +56,19 @@ class Fleet:
         self._robots: dict[str, _Robot] = {}
         self._news: dict[str, dict[str, Any]] = {}
         self.events = self.duplicates = self.missing = self.refused = 0
-        """Events that came, came again, did not come though a later one did; publications that are none of ours."""
+        """Events received, received twice, and skipped by a later one; messages that are not valid."""
 
     def topics(self) -> list[tuple[str, int]]:
-        """What to subscribe to, each with its quality of service."""
+        """The topics to subscribe to, each with its quality of service."""
         return [(f"{self._start}+/connection", 1), (f"{self._start}+/status", 0), (f"{self._start}+/events", 1)]
 
     def begin(self) -> None:
-        """The broker was not heard, and is from now on: events in between went by."""
+        """The connection is open again. Events published meanwhile do not count as missing."""
         for robot in self._robots.values():
             robot.session = ""
 
     def take(self, topic: str, payload: bytes, retained: bool, now: Instant) -> None:
-        """One publication, whatever it holds."""
+        """Read one message. Its content may be anything."""
         name, _, what = topic[len(self._start) :].partition("/")
         if not topic.startswith(self._start) or len(payload) > LONGEST or not self._known(name):
             self.refused += 1
@@ -85,10 +85,10 @@ class Fleet:
         return news
 
     def expire(self, now: Instant) -> None:
-        """Believe no longer what does not renew itself; to be called every second or so."""
+        """Mark robots without a new status within the keep-alive as unknown. Call this about once a second."""
         for name, robot in self._robots.items():
             if robot.live and now.mono - robot.at > self._keepalive:
-                self._doubt(name, robot, now)
+                self._mark_unknown(name, robot, now)
 
     def _known(self, name: str) -> bool:
         if name not in self._robots and len(self._robots) < MOST_ROBOTS:
@@ -100,9 +100,9 @@ class Fleet:
         robot.state = state if state in WHY else ""
         if robot.state != ONLINE:
             robot.at = -math.inf
-            self._doubt(name, robot, now)
+            self._mark_unknown(name, robot, now)
         elif not robot.live:
-            self._doubt(name, robot, now)
+            self._mark_unknown(name, robot, now)
 
     def _status(self, name: str, payload: bytes, retained: bool, now: Instant) -> None:
         robot = self._robots[name]
@@ -119,7 +119,7 @@ class Fleet:
             robot.live = True
             self._news[name] = {**line, "handle": name}
         else:
-            self._doubt(name, robot, now)
+            self._mark_unknown(name, robot, now)
 
     def _event(self, name: str, payload: bytes) -> None:
         robot = self._robots[name]
@@ -136,14 +136,14 @@ class Fleet:
             self.missing += seq - robot.seq - 1
         robot.session, robot.seq = session, seq
 
-    def _doubt(self, name: str, robot: _Robot, now: Instant) -> None:
+    def _mark_unknown(self, name: str, robot: _Robot, now: Instant) -> None:
         robot.live = False
-        line = unknown(robot.line, rfc3339(now.unix_us), WHY.get(robot.state, NO_WORD))
+        line = unknown(robot.line, rfc3339(now.unix_us), WHY.get(robot.state, NOT_ONLINE))
         self._news[name] = {**line, "handle": name}
 
 
 def _parsed(payload: bytes) -> dict[str, Any] | None:
-    """A native line, as far as others rely on it; None for what is none."""
+    """A native line whose members that readers rely on have the right types; None for anything else."""
     line = _object(payload)
     if line is None:
         return None
@@ -163,7 +163,7 @@ def _parsed(payload: bytes) -> dict[str, Any] | None:
 
 
 def _finite(text: str) -> float:
-    """A browser knows no other numbers."""
+    """JSON in a browser has finite numbers only."""
     if not math.isfinite(number := float(text)):
         raise ValueError(text)
     return number

@@ -1,4 +1,4 @@
-"""What is said about a robot: its status as a native line, and each change as an event. JSON texts and values."""
+"""The payloads of a robot's topics: its status as a native line, and each change as an event."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any, Final
 
 from ...clock import rfc3339
+from ...interface import FIELDS, RobotStatus
 from ..json_lines import native, native_body
 
 if TYPE_CHECKING:
@@ -14,22 +15,20 @@ if TYPE_CHECKING:
     from ...interface import RobotStatusMsg
 
 UNKNOWN: Final[dict[str, Any]] = {
-    "mode": "UNKNOWN",
-    **dict.fromkeys(("e_stopped", "drives_powered", "motion_possible", "in_motion", "in_error")),
-    "error_code": 0,
+    **{field.name: field.plain(value) for field, value in zip(FIELDS, RobotStatus(), strict=True)},
     "errors": [],
 }
-"""The members of a line of which nothing is known."""
+"""The members of a line while the status is unknown."""
 
 
 def line_of(msg: RobotStatusMsg, seq: int) -> str:
-    """The native line, without its end."""
+    """The native line without its line end."""
     return native(msg, seq, native_body(msg.handle, msg.status, msg.detail))[:-1]
 
 
 def unknown(line: Mapping[str, Any], stamp: str, why: str | None) -> dict[str, Any]:
-    """What is left of a robot's line once nobody speaks for it: who it is, and nothing else."""
-    heard = bool(line.get("stamp"))
+    """The line of a robot without a live status: it has the robot's identity, and UNKNOWN for the rest."""
+    seen = bool(line.get("stamp"))
     vehicle = line.get("vehicle")
     return {
         "stamp": stamp,
@@ -47,15 +46,15 @@ def unknown(line: Mapping[str, Any], stamp: str, why: str | None) -> dict[str, A
             "custom_mode": None,
             "state": None,
         },
-        "link": {"state": "LOST" if heard else "NEVER_SEEN", "heartbeat_age": None},
+        "link": {"state": "LOST" if seen else "NEVER_SEEN", "heartbeat_age": None},
     }
 
 
 def event_of(
     msg: RobotStatusMsg, old: Mapping[str, Any], new: Mapping[str, Any], robot: str, session: str, seq: int
 ) -> dict[str, Any]:
-    """What one change was: every member that is another now, with what it was; null for all before the first, which
-    has no `old`."""
+    """One change: each changed member with its old and new value. The first event has every member, with null as its
+    old value."""
     return {
         "id": f"{session}-{seq}",
         "session": session,
@@ -74,7 +73,7 @@ def event_of(
 
 
 def members_of(msg: RobotStatusMsg) -> dict[str, Any]:
-    """A line's members that can change, those of `vehicle` and `link` as `vehicle.flight_mode`, `link.state`."""
+    """The members that can change. Those of `vehicle` and `link` have names like `vehicle.flight_mode`."""
     line = json.loads("{" + native_body(msg.handle, msg.status, msg.detail) + "}}")
     groups = {name: line.pop(name) for name in ("vehicle", "link")}
     for name in ("handle", "system", "component"):

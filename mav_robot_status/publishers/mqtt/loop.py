@@ -1,4 +1,4 @@
-"""Turns many connections in one thread; what may block for long, opening one, happens in a second."""
+"""The event loop of all connections, in one thread. A second thread opens connections, because that may block."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     from ...clock import Instant
     from .connection import Connection
 
-TURN: Final = 1.0  # s between two looks at every connection
+TURN: Final = 1.0  # s between two timer calls of every connection
 MOST_DIALS: Final = 16
-"""Connections that are being opened, or wait for it, at a time."""
+"""Connections that may be in the queue of the second thread."""
 
 
 class Loop:
-    """Waits for all connections. `wake` may be called from any thread, everything else from one."""
+    """Polls all connections. Any thread may call `wake`; only one thread may call the rest."""
 
     def __init__(self, clock: Callable[[], Instant]) -> None:
         self._clock = clock
         self._connections: list[Connection] = []
         self._poll = select.poll()
         self._watched: dict[int, tuple[Connection, int]] = {}
-        """By descriptor: whose it is, and what is waited for."""
+        """The connection of each descriptor, and its poll events."""
         self._descriptors: dict[Connection, int] = {}
         self._due: deque[Connection] = deque()
         self._wake_read, self._wake_write = socket.socketpair()
@@ -44,17 +44,17 @@ class Loop:
         self._dialler.start()
 
     def add(self, connection: Connection) -> None:
-        """Open a connection, and keep it open."""
+        """Open a connection, and reopen it after each loss."""
         self._connections.append(connection)
         self._turned_at = float("-inf")
 
     def wake(self) -> None:
         """Make `turn` return soon."""
-        with contextlib.suppress(OSError):  # closed, or told often enough
+        with contextlib.suppress(OSError):  # closed, or full of wake-ups
             self._wake_write.send(b"x")
 
     def turn(self, longest: float = TURN) -> None:
-        """Wait until something comes, or for so many seconds; do it."""
+        """Wait for events, at most `longest` seconds, and handle them."""
         for fd, event in self._poll.poll(max(0.0, longest) * 1000):
             if fd == self._wake_read.fileno():
                 with contextlib.suppress(BlockingIOError):
@@ -77,13 +77,13 @@ class Loop:
         self._begin_dials(now)
 
     def watch(self, connection: Connection) -> None:
-        """Wait for what the connection wants now; to be called after something was written outside of a callback."""
+        """Update the poll events of a connection. Call this after each write outside of its callbacks."""
         sock: Any = connection.socket
         new = -1 if sock is None else sock.fileno()
         old = self._descriptors.get(connection, -1)
         if old != new and old >= 0:
             del self._descriptors[connection]
-            if self._watched[old][0] is connection:  # else it is another's by now
+            if self._watched[old][0] is connection:  # otherwise another connection has the descriptor now
                 del self._watched[old]
                 with contextlib.suppress(KeyError, OSError):
                     self._poll.unregister(old)
@@ -96,9 +96,9 @@ class Loop:
             self._poll.register(new, wanted[1])
 
     def close(self) -> None:
-        """Let go of the threads and sockets; connections are closed by their owners."""
+        """Release the thread and the sockets. The owners close the connections."""
         self._dials.put(None)
-        self._dialler.join(0.2)  # it may be opening one: then it ends later, by itself
+        self._dialler.join(0.2)  # a thread that is opening a connection ends after that
         self._wake_read.close()
         self._wake_write.close()
 
@@ -119,7 +119,7 @@ class Loop:
                 self._dials.put((connection, connection.dial()))
 
     def _dial(self) -> None:
-        while (asked := self._dials.get()) is not None:
-            connection, dial = asked
+        while (request := self._dials.get()) is not None:
+            connection, dial = request
             self._dialled.put((connection, dial()))
             self.wake()

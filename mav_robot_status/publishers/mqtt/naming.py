@@ -1,4 +1,4 @@
-"""What a robot is called on the topics: a template, filled in with what is known of it."""
+"""The name of a robot on its topics: a template with values of the vehicle and of this computer."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 PLACES: Final = ("system", "component", "handle", "host", "serial")
 SERIALS: Final = ("/sys/firmware/devicetree/base/serial-number", "/etc/machine-id")
-"""Where a computer's serial number is: boards with a device tree (Raspberry Pi, Jetson), else the installation's id."""
+"""Files with a serial number: the device tree (Raspberry Pi, Jetson), else the machine id of the installation."""
 LONGEST: Final = 100  # characters of a name
 _NO_LEVEL: Final = re.compile(r"[/+#$\s\x00-\x1f\x7f]+")
 
 
 class Naming:
-    """A template like `agv-{serial}-{system}`. Raises UsageError for one that cannot be filled in."""
+    """A template like `agv-{serial}-{system}`. Raises UsageError for an invalid one."""
 
     def __init__(self, template: str, host: str | None = None, serials: tuple[str, ...] = SERIALS) -> None:
         try:
@@ -30,16 +30,16 @@ class Naming:
             self._used = {"?"}
         if self._used - set(PLACES):
             known = ", ".join(f"{{{place}}}" for place in PLACES)
-            raise UsageError(f"mqtt: robot {template!r} is no template of a name; it may hold {known}")
+            raise UsageError(f"mqtt: robot {template!r} is not a valid template; the placeholders are {known}")
         self._template = template
         self._known = {"host": host if host is not None else socket.gethostname().partition(".")[0]}
         if "serial" in self._used:
             self._known["serial"] = _serial(serials)
         if not level(template.format_map(dict.fromkeys(PLACES, "x"))):
-            raise UsageError(f"mqtt: robot {template!r} gives no name")
+            raise UsageError(f"mqtt: robot {template!r} gives an empty name")
 
     def name(self, msg: RobotStatusMsg) -> str | None:
-        """The robot's name, one level of a topic; None while what the template asks for is not known."""
+        """The robot's name, one level of a topic; None while a value of the template is unknown."""
         of_vehicle = {"system": msg.detail.system, "component": msg.detail.component, "handle": msg.handle}
         if any(value is None and place in self._used for place, value in of_vehicle.items()):
             return None
@@ -60,4 +60,4 @@ def _serial(paths: tuple[str, ...]) -> str:
             continue
         if text:
             return text
-    raise UsageError("mqtt: this computer tells no serial number; write the robot's name without {serial}")
+    raise UsageError("mqtt: this computer has no serial number; write the robot's name without {serial}")

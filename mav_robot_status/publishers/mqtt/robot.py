@@ -1,4 +1,4 @@
-"""One robot on the broker: its status, its events in order, and its word that it is there."""
+"""One robot on the broker: its status, its events in order, and the state of its connection."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ if TYPE_CHECKING:
     from paho.mqtt.client import MQTTMessage
 
     from ...clock import Instant
-    from .complaints import Complaints
-    from .options import Broker
+    from .error_reporter import ErrorReporter
+    from .settings import Broker
     from .spool import Event, Spool
 
 ONLINE: Final = "ONLINE"
 OFFLINE: Final = "OFFLINE"
 BROKEN: Final = "CONNECTIONBROKEN"
-"""The states of a connection, as VDA 5050 calls them."""
+"""The states of a connection, by their names in VDA 5050."""
 WINDOW: Final = 100
-"""Events handed to the client that the broker has not acknowledged."""
+"""The limit on events that the client has and the broker has not acknowledged."""
 
 
 class Robot:
-    """What one robot says. Of the loop's thread."""
+    """The topics of one robot. Only the loop's thread may use it."""
 
-    def __init__(self, name: str, broker: Broker, spool: Spool, complaints: Complaints) -> None:
+    def __init__(self, name: str, broker: Broker, spool: Spool, errors: ErrorReporter) -> None:
         self._topic = f"{broker.prefix}/{name}"
         self._name, self._spool = name, spool
         self._expiry = broker.keepalive * 3 // 2 + 1
@@ -41,25 +41,25 @@ class Robot:
         self._handed = 0
         """The place of the last event that was handed to the client."""
         self._more = True
-        """Whether the spool may hold more than that."""
-        ident = "mrs-" + hashlib.sha256(self._topic.encode()).hexdigest()[:16]  # 23 characters are always allowed
+        """Whether the spool may hold later events."""
+        ident = "mrs-" + hashlib.sha256(self._topic.encode()).hexdigest()[:16]  # every broker allows 23 characters
         will = Will(f"{self._topic}/connection", BROKEN)
-        self.connection = Connection(broker, ident, will, self, complaints)
+        self.connection = Connection(broker, ident, will, self, errors)
 
     @property
     def settled(self) -> bool:
-        """Whether nothing is on its way any more."""
-        on_its_way = self._window or self._more or self._unanswered or self.connection.wants_write
-        return not (self.connection.open and on_its_way)
+        """Whether nothing waits for the broker."""
+        pending = self._window or self._more or self._unanswered or self.connection.wants_write
+        return not (self.connection.open and pending)
 
-    def tell(self, line: str) -> None:
-        """The newest status. Where the line is full it is left out: in a second there is another."""
+    def publish(self, line: str) -> None:
+        """Publish the newest status. It is skipped if the socket is full: the next one follows within a second."""
         self._line = line
         if self.connection.open and not self.connection.wants_write:
             self.connection.publish(f"{self._topic}/status", line, 0, True, self._expiry)
 
     def pump(self, news: bool = False) -> None:
-        """Hand waiting events to the client, as many as the window takes. `news`: there is a new one."""
+        """Hand waiting events to the client while the window has room. `news` is True after a new event."""
         self._more = self._more or news
         if not self.connection.open or not self._more or len(self._window) > WINDOW // 2:
             return
@@ -73,17 +73,17 @@ class Robot:
             self._handed = event.place
 
     def leave(self, now: Instant) -> None:
-        """Say that nothing is known from now on, and that this is meant so."""
+        """Publish an unknown status and the state OFFLINE."""
         if self.connection.open:
             if self._line:
                 last = unknown(json.loads(self._line), rfc3339(now.unix_us), None)
                 self._publish("status", json.dumps(last))
             self._publish("connection", OFFLINE)
 
-    # what the connection tells
+    # callbacks of the connection
 
     def opened(self) -> None:
-        """First what is so, or that nothing is known; then that we are there; then what waits."""
+        """Publish the status, or clear a retained one; then the state ONLINE; then the waiting events."""
         self.lost()
         self._handed, self._more = 0, True
         self._publish("status", self._line, self._expiry)
@@ -91,14 +91,14 @@ class Robot:
         self.pump()
 
     def lost(self) -> None:
-        """What was not acknowledged will be handed over again."""
+        """Forget pending publications. Events without an acknowledgement are sent again."""
         self._window.clear()
         self._unanswered.clear()
 
     def acknowledged(self, mid: int, refused: str | None) -> None:
-        """An event is the broker's, or nothing is: then again later, from the first that waits."""
+        """The broker has an event. After a refusal, reconnect later and start with the first waiting event."""
         if refused is not None:
-            self.connection.drop(f"it does not let us publish under {self._topic}/: {refused}")
+            self.connection.drop(f"it refuses publications under {self._topic}/: {refused}")
             return
         self._unanswered.discard(mid)
         event = self._window.pop(mid, None)
@@ -107,7 +107,7 @@ class Robot:
             self.pump()
 
     def received(self, message: MQTTMessage) -> None:
-        """Nothing was subscribed to."""
+        """Never called: a robot subscribes to no topic."""
 
     def _publish(self, what: str, text: str, expiry: int | None = None) -> None:
         self._unanswered.add(self.connection.publish(f"{self._topic}/{what}", text, 1, True, expiry))

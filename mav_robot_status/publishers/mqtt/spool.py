@@ -1,8 +1,8 @@
-"""Events that wait to be delivered, on disk: in order, bounded in size and age, what is dropped is counted.
+"""Undelivered events on disk: in order, with limits on size and age. Dropped events are counted.
 
-SQLite with a write-ahead log: what was committed outlives a kill of the process; a power cut may take the last moments
-(synchronous=NORMAL: only that would need FULL, and a sync of the disk for each event). While the disk takes nothing
-events wait in memory instead, and are written once it does.
+SQLite with a write-ahead log: a committed event survives a kill of the process. A power failure may lose the last
+moments (synchronous=NORMAL; FULL would sync the disk for each event). While the disk is full or fails, events wait in
+memory and are written later.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ log = logging.getLogger(__name__)
 
 MOST_UNWRITTEN: Final = 10_000
 """Events that wait in memory while the disk is full."""
-RETRY: Final = 1.0  # s until a disk that took nothing is tried again
-SWEEP: Final = 10.0  # s between two looks for events that are too old
+RETRY: Final = 1.0  # s until the next attempt after a write failed
+SWEEP: Final = 10.0  # s between two checks for old events
 CLOCK_SET: Final = 1_500_000_000.0
-"""Unix seconds (2017): before it a computer has not been told the time, and a stamp says nothing about an age."""
-OVERHEAD: Final = 64  # bytes that an event costs besides its text
-TELL: Final = 60.0  # s between two lines about dropped events
+"""Unix seconds (2017). An earlier stamp comes from a clock that was not set, and gives no age."""
+OVERHEAD: Final = 64  # bytes of an event besides its text
+LOG_INTERVAL: Final = 60.0  # s between two log messages about dropped events
 SCHEMA: Final = """
 CREATE TABLE IF NOT EXISTS events
     (place INTEGER PRIMARY KEY, robot TEXT NOT NULL, at REAL NOT NULL, text TEXT NOT NULL);
@@ -40,10 +40,10 @@ CREATE TABLE IF NOT EXISTS last (one INTEGER PRIMARY KEY, place INTEGER NOT NULL
 
 
 class Event(NamedTuple):
-    """One event that waits."""
+    """One undelivered event."""
 
     place: int
-    """Rises with every event that the spool was ever given."""
+    """The event's number in the spool. It rises with every event and is never used again."""
     robot: str
     at: float
     """Unix seconds."""
@@ -51,31 +51,31 @@ class Event(NamedTuple):
 
 
 class Spool:
-    """All events of one gateway. Of one thread."""
+    """All undelivered events of one gateway. Only one thread may use it."""
 
     def __init__(self, path: str, most_bytes: int, oldest: float) -> None:
-        """Open the file, or make it. Raises LinkError if that cannot be, or another gateway has it."""
+        """Open or create the file. Raises LinkError if that fails, or if another gateway has it open."""
         self._path, self._most, self._oldest = path, most_bytes, oldest
         self._db = self._open()
         self._unwritten: deque[Event] = deque()
         self._finished: dict[int, Event] = {}
         query = "SELECT max(place) FROM (SELECT place FROM events UNION SELECT place FROM last UNION SELECT 0)"
         self.last = self._place = int(self._db.execute(query).fetchone()[0])
-        """Places of the last events that were ever on the disk, and added."""
+        """The places of the last event written, and of the last event added."""
         query = f"SELECT count(*), coalesce(sum(length(text) + {OVERHEAD}), 0) FROM events"
         self._written, self._bytes = (int(number) for number in self._db.execute(query).fetchone())
-        """How many events are on the disk, and their bytes."""
+        """The number of events on disk, and their bytes."""
         self.dropped: Counter[str] = Counter(dict(self._db.execute("SELECT robot, count FROM dropped")))
-        """By robot, ever since the file was made."""
+        """Dropped events of each robot since the file was created."""
         self._newly: set[str] = set()
         """Robots whose count of dropped events is not written yet."""
-        self._retry_at = self._swept_at = self._told_at = -math.inf
-        self._told = sum(self.dropped.values())
+        self._retry_at = self._swept_at = self._logged_at = -math.inf
+        self._logged = sum(self.dropped.values())
         self.failed = False
-        """Whether the disk took nothing when it was tried last."""
+        """Whether the last write failed."""
 
     def robots(self) -> list[str]:
-        """Those for whom something waits."""
+        """The robots with waiting events."""
         written = (robot for (robot,) in self._db.execute("SELECT DISTINCT robot FROM events"))
         return list(dict.fromkeys([*written, *(event.robot for event in self._unwritten)]))
 
@@ -86,33 +86,33 @@ class Spool:
 
     @property
     def waiting(self) -> int:
-        """How many events wait."""
+        """The number of events that wait."""
         return max(0, self._written + len(self._unwritten) - len(self._finished))
 
     def add(self, event: Event) -> None:
-        """Take an event, whose place is beyond those before; `flush` writes it."""
+        """Add an event with a place beyond all others. `flush` writes it."""
         self._place = event.place
         self._unwritten.append(event)
         if len(self._unwritten) > MOST_UNWRITTEN:
             self._drop(self._unwritten.popleft().robot)
 
     def count_dropped(self, robot: str, count: int) -> None:
-        """Events of a robot that were dropped elsewhere, before they came here."""
+        """Count events of a robot that were dropped before they reached the spool."""
         self._drop(robot, count)
 
     def after(self, robot: str, place: int, limit: int) -> list[Event]:
-        """The oldest events of a robot beyond a place, at most so many."""
+        """The oldest events of a robot beyond a place, at most `limit`."""
         query = "SELECT place, robot, at, text FROM events WHERE robot = ? AND place > ? ORDER BY place LIMIT ?"
         rows = (Event(*row) for row in self._db.execute(query, (robot, place, limit + len(self._finished))))
         in_memory = (event for event in self._unwritten if event.robot == robot and event.place > place)
         return [event for event in (*rows, *in_memory) if event.place not in self._finished][:limit]
 
     def done(self, event: Event) -> None:
-        """An event is delivered; `flush` takes it from the disk."""
+        """An event is delivered. `flush` deletes it."""
         self._finished[event.place] = event
 
     def flush(self, now: float, unix: float) -> None:
-        """Write what is new, delete what is done, keep the bounds. `now` is monotonic."""
+        """Write new events, delete delivered ones, enforce the limits. `now` is monotonic seconds."""
         if now < self._retry_at:
             return
         if now - self._swept_at >= SWEEP:
@@ -121,10 +121,10 @@ class Spool:
         if not (self._unwritten or self._finished or self._newly):
             return
         delivered = [event for event in self._unwritten if event.place in self._finished]
-        for event in delivered:  # in memory, while the disk was full
+        for event in delivered:  # from memory, while the disk was full
             self._unwritten.remove(event)
             del self._finished[event.place]
-        with self._told_if_it_fails(now):
+        with self._report_failure(now):
             with self._db:
                 self._db.execute("BEGIN")
                 self._write()
@@ -132,21 +132,21 @@ class Spool:
             self._unwritten.clear()
             self._finished.clear()
             self._newly.clear()
-        self._tell(now)
+        self._log_dropped(now)
 
     def close(self, now: float, unix: float) -> None:
-        """Write the rest, tell what waits, let go of the file."""
+        """Write the rest, log how many events wait, close the file."""
         self._retry_at = -math.inf
         self.flush(now, unix)
         with contextlib.suppress(sqlite3.Error):
             if self.waiting:
-                log.warning("mqtt: %d events are not delivered yet; they wait in %s", self.waiting, self._path)
+                log.warning("mqtt: %d events are undelivered; they wait in %s", self.waiting, self._path)
         self._db.close()
 
     def _write(self) -> None:
         count, held = self._written, self._bytes
         for event in self._finished.values():
-            if self._db.execute("DELETE FROM events WHERE place = ?", (event.place,)).rowcount:  # else dropped before
+            if self._db.execute("DELETE FROM events WHERE place = ?", (event.place,)).rowcount:  # 0: dropped before
                 count, held = count - 1, held - _cost(event)
         self._db.executemany("INSERT INTO events VALUES (?, ?, ?, ?)", self._unwritten)
         self._db.execute("INSERT OR REPLACE INTO last VALUES (0, ?)", (self._place,))
@@ -161,7 +161,7 @@ class Spool:
         self._written, self._bytes = count, held
 
     def _sweep(self, unix: float) -> None:
-        """Drop what is too old."""
+        """Drop events that are too old."""
         query = "SELECT place, robot, at, text FROM events WHERE at BETWEEN ? AND ?"
         for row in self._db.execute(query, (CLOCK_SET, unix - self._oldest)).fetchall():
             event = Event(*row)
@@ -173,14 +173,14 @@ class Spool:
         self.dropped[robot] += count
         self._newly.add(robot)
 
-    def _tell(self, now: float) -> None:
+    def _log_dropped(self, now: float) -> None:
         total = sum(self.dropped.values())
-        if total > self._told and now - self._told_at >= TELL:
-            log.warning("mqtt: %d events were dropped so far: too many waited, or for too long", total)
-            self._told, self._told_at = total, now
+        if total > self._logged and now - self._logged_at >= LOG_INTERVAL:
+            log.warning("mqtt: %d events were dropped so far: the spool was full, or they were too old", total)
+            self._logged, self._logged_at = total, now
 
     @contextlib.contextmanager
-    def _told_if_it_fails(self, now: float) -> Iterator[None]:
+    def _report_failure(self, now: float) -> Iterator[None]:
         before = self.dropped.copy(), self._newly.copy(), self._written, self._bytes
         try:
             yield
@@ -188,11 +188,13 @@ class Spool:
             self.dropped, self._newly, self._written, self._bytes = before
             self._retry_at = now + RETRY
             if not self.failed:
-                log.warning("mqtt: %s takes no events (%s); they wait in memory, trying again", self._path, error)
+                log.warning(
+                    "mqtt: cannot write events to %s (%s); they wait in memory, trying again", self._path, error
+                )
             self.failed = True
         else:
             if self.failed:
-                log.warning("mqtt: %s takes events again", self._path)
+                log.warning("mqtt: writes events to %s again", self._path)
             self.failed = False
 
     def _open(self) -> sqlite3.Connection:
@@ -204,13 +206,13 @@ class Spool:
                 if isinstance(error, sqlite3.OperationalError):
                     raise
                 os.replace(self._path, f"{self._path}.broken")
-                log.warning("mqtt: %s was broken (%s); it is kept as %s.broken", self._path, error, self._path)
+                log.warning("mqtt: %s is corrupt (%s); it is now %s.broken", self._path, error, self._path)
                 return _connect(self._path)
         except sqlite3.Error as error:
             why = "another gateway uses it: give each its own --mqtt-spool FILE" if "locked" in str(error) else error
-            raise LinkError(f"mqtt: events cannot wait in {self._path}: {why}") from None
+            raise LinkError(f"mqtt: cannot store events in {self._path}: {why}") from None
         except OSError as error:
-            raise LinkError(f"mqtt: events cannot wait in {self._path}: {error.strerror}") from None
+            raise LinkError(f"mqtt: cannot store events in {self._path}: {error.strerror}") from None
 
 
 def _cost(event: Event) -> int:
@@ -218,7 +220,7 @@ def _cost(event: Event) -> int:
 
 
 def _connect(path: str) -> sqlite3.Connection:
-    """Open it for ourselves alone: the lock goes with the process, however it ends."""
+    """Open the file with an exclusive lock. The kernel releases the lock when the process ends."""
     db = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
     try:
         for pragma in ("locking_mode = EXCLUSIVE", "journal_mode = WAL", "synchronous = NORMAL", "mmap_size = 0"):

@@ -1,4 +1,4 @@
-"""The live board in a browser: a page, its event stream, and a JSON API. For reading only.
+"""The live board in a browser: a page, its event stream and a JSON API. All of it is read-only.
 
-`serve` needs a board and nothing else of this package's gateway; `publisher` is what the gateway uses.
+`serve` depends on a board only, not on the gateway. The gateway uses `publisher`.
 """

@@ -1,7 +1,7 @@
-"""The event stream: what has changed on the board, to every browser that listens.
+"""The event stream: the changes of the board, sent to each browser.
 
-Each browser is told what changed since it was told last, so that a slow one misses what was in between, and one that
-reads nothing is cut off. Those that keep up share the same bytes.
+Each browser gets the changes since its last event. A slow browser misses the states between; a browser that stops
+reading is disconnected. Browsers that keep up share the same bytes.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import json
 import socket
 from typing import TYPE_CHECKING, Any, Final
 
-from ... import __version__
 from ...clock import rfc3339
+from ...version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -21,36 +21,36 @@ if TYPE_CHECKING:
     from ..board import Board, Entry
 
 PULSE: Final = 0.2
-"""Seconds between two looks at the board, at the least."""
+"""Seconds between two checks of the board."""
 TICK: Final = 1.0
-"""Seconds between two events if nothing changes, so that a browser knows that we are there."""
+"""Seconds between two events without a change. They show a browser that the server is alive."""
 PATIENCE: Final = 5.0
-"""Seconds for which a browser may read nothing while there is something for it."""
+"""Seconds after which a browser that does not read is disconnected."""
 MOST_LISTENERS: Final = 256
 
 
 class Listener:
-    """One browser, what it looks at, and what it was told."""
+    """One browser: its selected vehicle, and the data that it has."""
 
-    __slots__ = ("abort", "busy_since", "explained", "handle", "told", "told_until", "turn")
+    __slots__ = ("abort", "busy_since", "explained", "handle", "sent_until", "sent_version", "turn")
 
     def __init__(self, handle: str | None, abort: Callable[[], None]) -> None:
         self.handle = handle
-        """The vehicle whose history and explanation it wants."""
+        """The handle of the vehicle that it shows in detail."""
         self.abort = abort
         self.busy_since: float | None = None
-        """When the write began that has not ended."""
-        self.told = -1
-        """The version of the board."""
+        """When the pending write began; None: nothing is pending."""
+        self.sent_version = -1
+        """The version of the board that it has."""
         self.turn = -1
-        """The tick."""
-        self.told_until: float | None = None
-        """The last moment of the history."""
+        """The last tick that it has."""
+        self.sent_until: float | None = None
+        """The end of the history that it has."""
         self.explained: Mapping[str, Any] | None = None
 
 
 class Events:
-    """All listeners. Everything here happens in the server's thread."""
+    """All listeners. Everything here runs in the server's thread."""
 
     def __init__(
         self,
@@ -59,32 +59,32 @@ class Events:
         standing: Callable[[], float | None],
         stale_after: float | None = None,
     ) -> None:
-        """`standing` tells for how many seconds the board's source has not turned; None if it turns."""
+        """`standing` returns for how many seconds the board's source has been stalled; None while it runs."""
         self._board, self._clock, self._standing, self._stale_after = board, clock, standing, stale_after
         self._news = asyncio.Event()
         self._version, self._turn, self._ticked = -1, 0, 0.0
         self._fresh = False
-        """Whether there is an explanation that was not told."""
+        """Whether there is a new explanation."""
         self._cache: dict[tuple[int, int], bytes] = {}
         self.listeners: set[Listener] = set()
         self.dropped = 0
-        """Listeners that were cut off."""
+        """Listeners that were disconnected."""
         self.watched: frozenset[str] = frozenset()
-        """Handles that somebody looks at. Read from other threads."""
+        """Handles that browsers show in detail. Other threads read this."""
         self.explanations: dict[str, Mapping[str, Any]] = {}
 
     def enter(self, listener: Listener) -> bool:
-        """Take a listener in; False if there are enough."""
+        """Add a listener; False if there are MOST_LISTENERS already."""
         if len(self.listeners) >= MOST_LISTENERS:
             return False
         self.listeners.add(listener)
-        self._look_who_watches()
+        self._update_watched()
         return True
 
     def leave(self, listener: Listener) -> None:
-        """Forget a listener."""
+        """Remove a listener."""
         self.listeners.discard(listener)
-        self._look_who_watches()
+        self._update_watched()
 
     def explain(self, handle: str, explanation: Mapping[str, Any]) -> None:
         """The newest explanation of a handle; a new object each time."""
@@ -93,11 +93,11 @@ class Events:
             self._fresh = True
 
     async def wait(self) -> None:
-        """Wait for the next pulse with news."""
+        """Wait for the next pulse with a change."""
         await self._news.wait()
 
     def pulse(self) -> None:
-        """To be called every PULSE: wake those who wait if there is news, cut off those who read nothing."""
+        """Call this every PULSE. It wakes the listeners after a change and disconnects those that do not read."""
         now = self._clock().mono
         for listener in self.listeners:
             if listener.busy_since is not None and now - listener.busy_since > PATIENCE:
@@ -115,41 +115,41 @@ class Events:
         self._news.clear()
 
     def since(self, listener: Listener) -> bytes:
-        """What a listener has not been told yet; empty if that is nothing."""
+        """The events that a listener does not have; empty if it has all."""
         board = self._board
         parts = []
-        if listener.told != board.version or listener.turn != self._turn:
-            key = (listener.told, listener.turn)
+        if listener.sent_version != board.version or listener.turn != self._turn:
+            key = (listener.sent_version, listener.turn)
             if key not in self._cache:
                 self._cache[key] = self._change(*key)
             parts.append(self._cache[key])
-            listener.told, listener.turn = board.version, self._turn
+            listener.sent_version, listener.turn = board.version, self._turn
         entry = board.entries.get(listener.handle) if listener.handle is not None else None
         if entry is not None and listener.handle is not None:
             parts.extend(self._about(listener.handle, entry, listener))
         return b"".join(parts)
 
-    def _look_who_watches(self) -> None:
+    def _update_watched(self) -> None:
         self.watched = frozenset(one.handle for one in self.listeners if one.handle is not None)
         for handle in self.explanations.keys() - self.watched:
             del self.explanations[handle]
 
-    def _change(self, told: int, turn: int) -> bytes:
+    def _change(self, sent: int, turn: int) -> bytes:
         now = self._clock()
         data: dict[str, Any] = {"now": rfc3339(now.unix_us), "standing": self._standing()}
-        data["vehicles"] = [entry.whole() for entry in self._board if entry.version > told]
+        data["vehicles"] = [entry.whole() for entry in self._board if entry.version > sent]
         if turn != self._turn:
             data["beats"] = {
                 handle: [entry.stamp, entry.heartbeat_age, round(now.mono - entry.at, 3)]
                 for handle, entry in self._board.entries.items()
             }
-        if told < 0:
+        if sent < 0:
             data.update(source=socket.gethostname(), version=__version__, stale_after=self._stale_after)
-        return event("board" if told < 0 else "change", data)
+        return event("board" if sent < 0 else "change", data)
 
     def _about(self, handle: str, entry: Entry, listener: Listener) -> Iterator[bytes]:
         now = self._clock().mono
-        since, listener.told_until = listener.told_until, now
+        since, listener.sent_until = listener.sent_until, now
         new = [t for t in entry.transitions if since is None or t.at > since]
         if since is None or new:
             data = {

@@ -1,4 +1,4 @@
-"""The `http` publisher: hands statuses to a web server in the same process, and never waits for it."""
+"""The `http` publisher: hands statuses to a web server in the same process and never waits for it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...errors import UsageError
 from ..board import Board
-from .options import read
+from .options import HttpOptions
+from .settings import read
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,21 +19,22 @@ if TYPE_CHECKING:
     from .events import Events
 
 MOST_WAITING: Final = 10_000
-"""Messages kept for a server that is not ready for more; beyond that only the last of each handle is."""
-RETRY: Final = 0.05  # s until a server that is not ready for more is asked again
+"""Messages kept for a busy server. Beyond that, only the last of each handle is kept."""
+RETRY: Final = 0.05  # s until the next attempt after the server was busy
 EXPLAIN: Final = 1.0
-"""Seconds between two explanations of a vehicle that somebody looks at."""
+"""Seconds between two explanations of a vehicle that a browser shows in detail."""
 
 
 class HttpPublisher:
     """The live board in a browser.
 
-    Options: `listen` (HOST:PORT, 127.0.0.1:8765), `token_file`, `open`, `hosts`: see docs/web.md. Raises UsageError for
-    others and if the extra is not installed, LinkError if the port is taken.
+    Raises UsageError for a wrong option and if the extra `web` is not installed, LinkError if the port is in use.
     """
 
     periodic = True
+    live_only = True
 
+    options_type = HttpOptions
     check_options = staticmethod(read)
 
     def __init__(self, context: PublisherContext) -> None:
@@ -48,38 +50,38 @@ class HttpPublisher:
         self._waiting: list[RobotStatusMsg] = []
         self._explanations: dict[str, Mapping[str, Any]] = {}
         self._explained: dict[str, float] = {}
-        """When (monotonic seconds) each vehicle that somebody looks at was explained."""
+        """When (monotonic seconds) each vehicle that a browser shows was explained."""
         self._statuses: dict[str, RobotStatus] = {}
-        """Of those: the status that was published last."""
+        """The last status of each of these vehicles."""
         self._metrics = context.metrics
         self._scrapes = Scrapes()
         self.dropped = 0
-        """Messages that the server had no time for."""
+        """Messages left out because the server was busy."""
         self._server = serve(Board(), options, None if self._metrics is None else self._scrapes)
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """The address of the page."""
         return self._server.url
 
     def busy(self) -> bool:
-        """Never: what the server has no time for is left out."""
+        """Never. Messages for a busy server are left out."""
         return False
 
     @property
     def queued(self) -> int:
-        """Messages kept until the server is ready for more."""
+        """Messages that wait for the server."""
         return len(self._waiting)
 
     def publish(self, msg: RobotStatusMsg) -> None:
-        """Hold it until `service`, which is called after every round of updates."""
+        """Hold the message until `service`, which follows every round of updates."""
         self._waiting.append(msg)
         if msg.handle in self._explained and self._statuses.get(msg.handle) is not msg.status:
             self._statuses[msg.handle] = msg.status
-            self._explained[msg.handle] = -math.inf  # what is explained is what is shown
+            self._explained[msg.handle] = -math.inf  # the explanation must match the shown status
 
     def service(self, now: Instant) -> float | None:
-        """Hand over; explain one vehicle that somebody looks at, if it is its turn."""
+        """Hand messages to the server; explain one of the vehicles that browsers show, if it is due."""
         self._server.turned = now.mono
         if self._scrapes.wanted and self._metrics is not None:
             self._scrapes.wanted = False
@@ -95,11 +97,11 @@ class HttpPublisher:
         return min(again, now.mono + RETRY) if self._waiting else again
 
     def close(self) -> None:
-        """End the server."""
+        """Stop the server."""
         self._server.close()
 
     def _explain_one(self, now: Instant) -> float:
-        """One in a round, so that many who look cost the others no time; when the next is due."""
+        """Explain at most one vehicle, so that many browsers do not delay the gateway; return when the next is due."""
         watched = self._server.watched
         if not watched or self._explain is None:
             return math.inf
@@ -122,8 +124,8 @@ def _put(
     events: Events,
     now: Instant,
 ) -> None:
-    """In the server's thread."""
+    """Runs in the server's thread."""
     for msg in messages:
-        board.take(msg, now.mono)
+        board.update(msg, now.mono)
     for handle, explanation in explanations.items():
         events.explain(handle, explanation)

@@ -1,9 +1,10 @@
-"""`serve`: a board as a web page with a JSON API, in a thread of its own."""
+"""`serve`: a board as a web page with a JSON API, in a separate thread."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import logging
 import mimetypes
 import threading
@@ -13,12 +14,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from aiohttp import web
 
-from ... import __version__
 from ...clock import now as present
-from .door import Door, dress
+from ...interface import STATES
+from ...version import __version__
+from .access_control import AccessControl, add_headers
 from .events import PULSE, Events, Listener
-from .options import WebOptions, listen
 from .scrape import Scrapes
+from .settings import WebSettings, listen
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,55 +31,55 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 quiet = logging.getLogger(f"{__name__}.http")
-quiet.setLevel(logging.CRITICAL)  # what is no HTTP is answered, and no news
+quiet.setLevel(logging.CRITICAL)  # aiohttp logs each request that is not HTTP
 
 STANDING: Final = 5.0
-"""Seconds without a turn of the board's source after which it counts as standing still."""
+"""Seconds without a round of the event loop after which the board's source counts as stalled."""
 KEEP_ALIVE: Final = 15.0  # s
 CLOSING: Final = 2.0  # s to wait for the thread to end
 SCHEMA: Final = "robot_status.schema.json"
 
 
 class WebServer:
-    """The server of a board. The board is its own from now on: only what is given to `post` may write to it."""
+    """The server of a board. It owns the board: only functions given to `post` may write to it."""
 
     def __init__(
         self,
         board: Board,
-        options: WebOptions,
+        options: WebSettings,
         clock: Callable[[], Instant] = present,
         scrapes: Scrapes | None = None,
     ) -> None:
-        """Listen. Raises LinkError if the port is taken. `scrapes`: where those wait who ask for metrics."""
+        """Listen. Raises LinkError if the port is in use. `scrapes` holds the waiting requests for metrics."""
         self.board = board
         self._clock, self._stale_after, self._scrapes = clock, options.stale_after, scrapes
         self._socket = listen(options)
         host, port = self._socket.getsockname()[:2]
         self.url = f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
         self.turned: float | None = None
-        """When (monotonic seconds) the board's source last turned; None: it need not. Set from any thread."""
+        """When (monotonic seconds) the event loop of the source last ran; None: not checked. Any thread may set it."""
         self._posted = False
         self._ready = threading.Event()
         self._loop: asyncio.AbstractEventLoop
         self._events: Events
-        self._door = Door(options, lambda: clock().mono)
+        self._access = AccessControl(options, lambda: clock().mono)
         self._thread = threading.Thread(target=self._run, name="http", daemon=True)
 
     @property
     def watched(self) -> frozenset[str]:
-        """Handles that somebody looks at, and wants explained."""
+        """Handles that browsers show in detail. They need explanations."""
         return self._events.watched
 
     def start(self) -> None:
-        """Begin to serve."""
+        """Start the thread."""
         self._thread.start()
         self._ready.wait()
         log.info("the page is at %s", self.url)
 
     def post(self, change: Callable[[Board, Events, Instant], None]) -> bool:
-        """Have `change` called in the server's thread. From one other thread; returns at once.
+        """Run `change` in the server's thread. One other thread may call this; it returns at once.
 
-        False if the server has not yet come to the last change: then keep what is new, and post it later.
+        False if the last change is still waiting: keep the new data and post it later.
         """
         if self._posted:
             return False
@@ -87,19 +89,19 @@ class WebServer:
         return True
 
     def give(self, metrics: Metrics) -> None:
-        """Answer those who wait for metrics. From any thread."""
+        """Answer the waiting requests for metrics. Any thread may call this."""
         assert self._scrapes is not None
         with contextlib.suppress(RuntimeError):  # closed
             self._loop.call_soon_threadsafe(self._scrapes.give, metrics)
 
     def close(self) -> None:
-        """End it; browsers are cut off."""
+        """Stop the server and disconnect the browsers."""
         with contextlib.suppress(RuntimeError):  # closed before
             self._loop.call_soon_threadsafe(self._stop.set)
         self._thread.join(CLOSING)
 
     def standing(self) -> float | None:
-        """For how many seconds the board's source has not turned, if that is too long."""
+        """Seconds since the event loop of the source last ran, if more than STANDING; else None."""
         seconds = 0.0 if self.turned is None else self._clock().mono - self.turned
         return round(seconds, 1) if seconds > STANDING else None
 
@@ -114,21 +116,21 @@ class WebServer:
         self._loop = asyncio.get_running_loop()
         self._stop = asyncio.Event()
         self._events = Events(self.board, self._clock, self.standing, self._stale_after)
-        app = web.Application(middlewares=[self._door.middleware()])
-        app.on_response_prepare.append(dress)
+        app = web.Application(middlewares=[self._access.middleware()])
+        app.on_response_prepare.append(add_headers)
         self._add_routes(app)
         runner = web.AppRunner(
             app, access_log=None, logger=quiet, keepalive_timeout=KEEP_ALIVE, shutdown_timeout=0.1, handle_signals=False
         )
         await runner.setup()
         assert runner.server is not None
-        self._door.opens_to(runner.server)
-        server = await self._loop.create_server(self._door, sock=self._socket)
+        self._access.set_server(runner.server)
+        server = await self._loop.create_server(self._access, sock=self._socket)
         self._ready.set()
         try:
             while not self._stop.is_set():
                 self._events.pulse()
-                self._door.look()
+                self._access.close_silent()
                 with contextlib.suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(self._stop.wait(), PULSE)
         finally:
@@ -140,6 +142,7 @@ class WebServer:
     def _add_routes(self, app: web.Application) -> None:
         for name, body in _assets().items():
             app.router.add_get("/" if name == "index.html" else f"/{name}", _asset(name, body))
+        app.router.add_get("/fields.js", _asset("fields.js", _fields_module()))
         app.router.add_get(
             "/schema.json", _asset(SCHEMA, files("mav_robot_status").joinpath(f"data/{SCHEMA}").read_bytes())
         )
@@ -175,7 +178,7 @@ class WebServer:
 
         listener = Listener(request.query.get("handle"), abort)
         if not self._events.enter(listener):
-            return web.Response(status=503, text="Too many listen already.\n", headers={"Retry-After": "10"})
+            return web.Response(status=503, text="Too many clients.\n", headers={"Retry-After": "10"})
         response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "X-Accel-Buffering": "no"})
         try:
             with contextlib.suppress(ConnectionError):
@@ -191,15 +194,15 @@ class WebServer:
         return response
 
 
-def serve(board: Board, options: WebOptions, scrapes: Scrapes | None = None) -> WebServer:
-    """Serve a board from now on. Raises LinkError if the port is taken."""
+def serve(board: Board, options: WebSettings, scrapes: Scrapes | None = None) -> WebServer:
+    """Serve a board. Raises LinkError if the port is in use."""
     server = WebServer(board, options, scrapes=scrapes)
     server.start()
     return server
 
 
 def find(board: Board, which: str) -> Entry | None:
-    """By system id (the first of several), by `system.component`, or by handle."""
+    """Find an entry by system id (the first of several), by `system.component`, or by handle."""
     for entry in board:
         system, component = entry.line.get("system"), entry.line.get("component")
         if which in (str(system), f"{system}.{component}"):
@@ -210,6 +213,12 @@ def find(board: Board, which: str) -> Entry | None:
 def _assets() -> dict[str, bytes]:
     folder = files(__package__).joinpath("assets")
     return {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
+
+
+def _fields_module() -> bytes:
+    """The fields with named values, for the scripts of the page."""
+    rows = [{"name": field.name, "kind": field.kind.value, "meaning": field.row.meaning} for field in STATES]
+    return f"export const STATES = {json.dumps(rows)};\n".encode()
 
 
 def _asset(name: str, body: bytes) -> Callable[[web.Request], Any]:

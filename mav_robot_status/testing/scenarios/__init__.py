@@ -1,6 +1,6 @@
-"""Scenarios that come along: `ardurover.BOOT`, `arducopter.CRASH`, `px4.KILL`, ..., and `DEMO`.
+"""The ready scenarios: `ardurover.BOOT`, `arducopter.CRASH`, `px4.KILL`, ..., and `DEMO`.
 
-`BY_NAME` has all of them under names as `ardurover/boot`.
+`BY_NAME` has all of them by name, for example `ardurover/boot`.
 """
 
 from __future__ import annotations

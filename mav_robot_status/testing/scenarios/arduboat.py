@@ -9,7 +9,7 @@ _STILL = (0.0, 0.0, 0.0)
 
 _CAST_OFF = (
     step(3.0, "the skipper arms", armed=True),
-    step(4.0, "off it goes", velocity=(1.5, 0.0, 0.0), throttle=40),
+    step(4.0, "the skipper drives off", velocity=(1.5, 0.0, 0.0), throttle=40),
 )
 
 
@@ -17,18 +17,23 @@ def _scenario(title: str, *steps: Step) -> Scenario:
     return Scenario(title, ARDUBOAT, ARDUBOAT.ready, steps)
 
 
-READY = _scenario("disarmed in MANUAL, ready to be armed; nothing happens by itself")
+READY = _scenario("disarmed in MANUAL, ready to be armed; no steps")
 DRIFT = _scenario(
-    "LOITER: it drifts, is rolled by the waves, and pushes itself back",
+    "LOITER: the boat drifts, rolls in the waves, and returns to its position",
     *_CAST_OFF,
     step(7.0, "LOITER, in still water", custom_mode=5, velocity=_STILL, throttle=0),
-    step(11.0, "waves: heave and roll are no motion of a boat", velocity=(0.0, 0.05, 0.6), rates=(0.5, 0.3, 0.01)),
+    step(
+        11.0,
+        "waves: heave and roll do not count as motion of a boat",
+        velocity=(0.0, 0.05, 0.6),
+        rates=(0.5, 0.3, 0.01),
+    ),
     step(15.0, "it drifts", velocity=(0.0, 0.4, 0.6)),
     step(19.0, "HOLD: the motor is off, it drifts on", custom_mode=4),
     step(23.0, "disarmed and drifting faster", armed=False, velocity=(0.0, 0.7, 0.0), rates=_STILL),
 )
 GCS_FAILSAFE = _scenario(
-    "the ground station is lost in GUIDED; the boat calls that a radio failsafe",
+    "the ground station is lost in GUIDED; the boat reports a radio failsafe",
     *_CAST_OFF,
     step(6.0, "GUIDED", custom_mode=15),
     step(

@@ -23,7 +23,7 @@ def _scenario(title: str, *steps: Step) -> Scenario:
     return Scenario(title, ARDUCOPTER, ARDUCOPTER.ready, steps)
 
 
-READY = _scenario("disarmed in STABILIZE on the ground, ready to be armed; nothing happens by itself")
+READY = _scenario("disarmed in STABILIZE on the ground, ready to be armed; no steps")
 BOOT = Scenario("power on until ready to be armed", ARDUCOPTER, ARDUCOPTER.booting, ARDUCOPTER.boot)
 PREARM_FAILING = _scenario(
     "cannot be armed for a while",
@@ -78,7 +78,7 @@ RC_ESTOP = _scenario(
         velocity=(0.0, 0.0, 8.0),
         throttle=100,
     ),
-    step(11.2, "it does not climb, whatever the throttle", (0, "Potential Thrust Loss (3)")),
+    step(11.2, "it does not climb at full throttle", (0, "Potential Thrust Loss (3)")),
     step(12.0, "it has hit the ground; the land detector has not noticed", velocity=_STILL),
     step(15.0, "lying still, it disarms", armed=False, **_LANDED),
     step(19.0, "released", (6, "RC7: MotorEStop LOW"), emergency_stop=False),

@@ -14,7 +14,7 @@ _CRUISE = (18.0, 0.0, 0.0)
 _TERRAIN = 1 << 22
 
 _TAKE_OFF = (
-    step(3.0, "TAKEOFF: the autopilot will launch by itself", custom_mode=13),
+    step(3.0, "TAKEOFF: the autopilot will take off automatically", custom_mode=13),
     step(4.0, "armed on the runway: STANDBY until it flies", armed=True),
     step(
         6.0,
@@ -24,7 +24,7 @@ _TAKE_OFF = (
         velocity=(15.0, 0.0, -3.0),
         throttle=100,
     ),
-    step(10.0, "LOITER: on a Plane a program", custom_mode=12, velocity=_CRUISE, throttle=60),
+    step(10.0, "LOITER: AUTO on a Plane", custom_mode=12, velocity=_CRUISE, throttle=60),
 )
 _FBWA = step(12.0, "FBWA: the pilot steers", custom_mode=5)
 _LANDED: dict[str, Any] = {"landed_state": ON_GROUND, "velocity": _STILL, "throttle": 0}
@@ -34,7 +34,7 @@ def _scenario(title: str, *steps: Step) -> Scenario:
     return Scenario(title, ARDUPLANE, ARDUPLANE.ready, steps)
 
 
-READY = _scenario("disarmed in MANUAL on the ground, ready to be armed; nothing happens by itself")
+READY = _scenario("disarmed in MANUAL on the ground, ready to be armed; no steps")
 BOOT = Scenario("power on until ready to be armed", ARDUPLANE, ARDUPLANE.booting, ARDUPLANE.boot)
 MANUAL = _scenario(
     "armed in FBWA, flown by hand, landed",
@@ -52,7 +52,7 @@ AUTO = _scenario(
     step(19.0, "disarmed by the landing", armed=False),
 )
 RC_FAILSAFE = _scenario(
-    "the radio is lost in FBWA: first CIRCLE, five seconds later RTL; then it is back",
+    "the radio is lost in FBWA: first CIRCLE, five seconds later RTL; then the radio is back",
     *_TAKE_OFF,
     _FBWA,
     step(
@@ -67,7 +67,7 @@ RC_FAILSAFE = _scenario(
     step(20.2, "long failsafe: RTL", (4, "RC Long Failsafe On: RTL"), custom_mode=11),
     step(
         27.5,
-        "the radio is back; RTL goes on",
+        "the radio is back; RTL continues",
         (4, "Throttle failsafe off"),
         (4, "RC Long Failsafe Cleared"),
         failsafe=False,
@@ -93,7 +93,7 @@ CRASH = _scenario(
 TERMINATION = _scenario(
     "the advanced failsafe ends the flight at a ground station's command, until a reboot",
     *_TAKE_OFF,
-    step(14.0, "announced as a mere INFO", (6, "Terminating due to GCS request")),
+    step(14.0, "the text has only severity INFO", (6, "Terminating due to GCS request")),
     step(
         14.05,
         "disarmed in flight: it falls, still ACTIVE and IN_AIR",
@@ -106,7 +106,7 @@ TERMINATION = _scenario(
     step(22.0, "the autopilot reboots", action=Action.REBOOT),
 )
 NO_TERRAIN_DATA = _scenario(
-    "a flight without terrain data: TERRAIN is enabled and unhealthy, as in every recorded one",
+    "a flight without terrain data: TERRAIN is enabled and unhealthy, as in every recorded flight",
     step(0.0, "no ground station sends terrain data", sensors_health=_HEALTH & ~_TERRAIN),
     *_TAKE_OFF,
 )

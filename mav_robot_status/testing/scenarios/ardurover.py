@@ -19,7 +19,7 @@ def _scenario(title: str, *steps: Step) -> Scenario:
     return Scenario(title, ARDUROVER, ARDUROVER.ready, steps)
 
 
-READY = _scenario("disarmed in MANUAL, ready to be armed; nothing happens by itself")
+READY = _scenario("disarmed in MANUAL, ready to be armed; no steps")
 BOOT = Scenario("power on until ready to be armed", ARDUROVER, ARDUROVER.booting, ARDUROVER.boot)
 PREARM_FAILING = _scenario(
     "cannot be armed for a while",
@@ -69,16 +69,16 @@ SAFETY_SWITCH = _scenario(
     "the hardware safety switch is pressed while armed, and again",
     *_ARM_AND_DRIVE,
     step(6.0, "safety switch on: the outputs are dead", safety_switch=True, throttle=0),
-    step(7.0, "the rover has rolled out", velocity=_STOPPED),
+    step(7.0, "the rover has stopped", velocity=_STOPPED),
     step(10.0, "safety switch off", safety_switch=False),
 )
 RC_ESTOP = _scenario(
     "motor emergency stop by an RC switch in AUTO, then released",
     *_ARM_AND_DRIVE,
     _AUTO,
-    step(9.0, "emergency stop: no bit shows it, only a text", (6, "RC7: MotorEStop HIGH"), emergency_stop=True),
-    step(10.0, "the rover has rolled out, and AUTO asks for ever more throttle", velocity=_STOPPED, throttle=58),
-    step(12.0, "more throttle, to no avail", throttle=81),
+    step(9.0, "emergency stop: only a text reports it", (6, "RC7: MotorEStop HIGH"), emergency_stop=True),
+    step(10.0, "the rover has stopped, and AUTO increases the throttle", velocity=_STOPPED, throttle=58),
+    step(12.0, "more throttle has no effect", throttle=81),
     step(
         14.0,
         "released: the rover drives on",

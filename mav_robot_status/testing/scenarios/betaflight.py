@@ -1,4 +1,4 @@
-"""Betaflight: a GENERIC autopilot whose base_mode always says MANUAL. AVAILABLE_MODES tells what its modes are.
+"""Betaflight: a GENERIC autopilot whose base_mode is always MANUAL. AVAILABLE_MODES describes its modes.
 
 Modes: 0 Acro, 1 Angle, 2 Horizon, 3 Alt Hold, 4 Pos Hold, 5 Autopilot, 6 RTL, 7 Failsafe.
 """
@@ -15,7 +15,7 @@ def _scenario(title: str, *steps: Step) -> Scenario:
     return Scenario(title, BETAFLIGHT, BETAFLIGHT.ready, steps)
 
 
-READY = _scenario("disarmed in Acro, ready to be armed; nothing happens by itself")
+READY = _scenario("disarmed in Acro, ready to be armed; no steps")
 BOOT = Scenario("power on until ready to be armed", BETAFLIGHT, BETAFLIGHT.booting, BETAFLIGHT.boot)
 MANUAL = _scenario(
     "flown by hand, landed, disarmed",
@@ -25,14 +25,14 @@ MANUAL = _scenario(
     step(13.0, "disarmed", armed=False),
 )
 AUTOPILOT = _scenario(
-    "the autopilot flies, then the pilot, then it returns by itself",
+    "the autopilot flies, then the pilot, then RTL",
     step(3.0, "armed in Angle", armed=True, custom_mode=1),
-    step(6.0, "Autopilot: base_mode still says MANUAL", custom_mode=5, velocity=(3.0, 0.0, 0.0), throttle=50),
+    step(6.0, "Autopilot: base_mode is still MANUAL", custom_mode=5, velocity=(3.0, 0.0, 0.0), throttle=50),
     step(11.0, "Pos Hold: the pilot", custom_mode=4, velocity=_STILL),
-    step(15.0, "RTL: base_mode still says MANUAL", custom_mode=6, velocity=(3.0, 0.0, 0.0)),
+    step(15.0, "RTL: base_mode is still MANUAL", custom_mode=6, velocity=(3.0, 0.0, 0.0)),
 )
 FAILSAFE = _scenario(
-    "the failsafe switch: it disarms",
+    "the failsafe switch disarms it",
     step(3.0, "armed in Angle", armed=True, custom_mode=1),
     step(
         6.0,
@@ -43,6 +43,12 @@ FAILSAFE = _scenario(
         custom_mode=7,
         prearm="FAILSAFE RXLOSS",
     ),
-    step(12.0, "over", (5, "Arming disabled: THROTTLE ARM_SWITCH"), custom_mode=0, prearm="THROTTLE ARM_SWITCH"),
+    step(
+        12.0,
+        "the failsafe ends",
+        (5, "Arming disabled: THROTTLE ARM_SWITCH"),
+        custom_mode=0,
+        prearm="THROTTLE ARM_SWITCH",
+    ),
     step(15.0, "the arm switch is off", prearm=""),
 )

@@ -1,4 +1,4 @@
-"""ArduPilot Blimp. Modes: 0 LAND, 1 MANUAL, 2 VELOCITY, 3 LOITER, 4 RTL; an old version has 0 and 1 the other way."""
+"""ArduPilot Blimp. Modes: 0 LAND, 1 MANUAL, 2 VELOCITY, 3 LOITER, 4 RTL; an old version has 0 and 1 swapped."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ def _scenario(title: str, *steps: Step) -> Scenario:
     return Scenario(title, BLIMP, BLIMP.ready, steps)
 
 
-READY = _scenario("disarmed in MANUAL, ready to be armed; nothing happens by itself")
+READY = _scenario("disarmed in MANUAL, ready to be armed; no steps")
 FLIGHT = _scenario(
-    "a flight by hand, back by itself",
+    "a manual flight and an automatic return",
     *_LIFT_OFF,
-    step(9.0, "LOITER: the sticks move the place that it keeps", custom_mode=3, velocity=_STILL),
-    step(12.0, "RTL: a program", custom_mode=4, velocity=(0.5, 0.0, 0.0)),
+    step(9.0, "LOITER: the sticks move its hold position", custom_mode=3, velocity=_STILL),
+    step(12.0, "RTL: AUTO", custom_mode=4, velocity=(0.5, 0.0, 0.0)),
     step(16.0, "LAND", custom_mode=0, velocity=(0.0, 0.0, 0.2)),
     step(20.0, "landed", landed_state=ON_GROUND, velocity=_STILL, throttle=0),
     step(22.0, "disarmed by the landing", armed=False),
 )
 RC_FAILSAFE = _scenario(
-    "the radio is lost in the air: it lands by itself",
+    "the radio is lost in the air: it lands automatically",
     *_LIFT_OFF,
     step(
         9.0,

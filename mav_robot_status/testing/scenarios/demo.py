@@ -1,4 +1,4 @@
-"""The story of the `demo` command: half a minute of a rover, in which the status changes for reasons to follow."""
+"""The scenario of the `demo` command: half a minute of a rover. Each note gives the reason for a change."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ DEMO = Scenario(
     ARDUROVER,
     ARDUROVER.booting,
     steps=(
-        step(0.0, "power on: the autopilot initialises, nobody is in charge yet"),
+        step(0.0, "power on: the autopilot initialises, the mode is unknown"),
         *ARDUROVER.boot[:-1],
-        step(2.1, "the autopilot says why it cannot be armed", (2, "PreArm: GPS 1: Bad fix")),
+        step(2.1, "the autopilot reports why it cannot be armed", (2, "PreArm: GPS 1: Bad fix")),
         ARDUROVER.boot[-1],
         step(8.5, "the driver arms: the drives are powered", armed=True),
         step(10.0, "the driver drives off in MANUAL", velocity=(1.0, 0.0, 0.0), throttle=31),
         step(
             12.5,
-            "AUTO: the mission is in charge now",
+            "AUTO: the mission drives",
             (6, "Mission: 1 WP"),
             custom_mode=10,
             velocity=(2.0, 0.0, 0.0),
@@ -29,7 +29,7 @@ DEMO = Scenario(
         ),
         step(
             15.0,
-            "the radio is lost: failsafe, the rover stops in HOLD. That is an error",
+            "the radio is lost: a failsafe, the rover stops in HOLD, in_error becomes true",
             (4, "Radio Failsafe"),
             custom_mode=4,
             failsafe=True,
@@ -46,7 +46,7 @@ DEMO = Scenario(
         ),
         step(
             18.5,
-            "AUTO again: the mission goes on",
+            "AUTO again: the mission continues",
             (6, "Mission: 1 WP"),
             custom_mode=10,
             velocity=(2.0, 0.0, 0.0),
@@ -58,7 +58,7 @@ DEMO = Scenario(
             (6, "RC7: MotorEStop HIGH"),
             emergency_stop=True,
         ),
-        step(21.0, "the rover has rolled out", velocity=_STOPPED, throttle=58),
+        step(21.0, "the rover has stopped", velocity=_STOPPED, throttle=58),
         step(
             22.5,
             "emergency stop released: it drives on",
@@ -70,13 +70,13 @@ DEMO = Scenario(
         step(24.0, "it runs into a wall", velocity=_STOPPED, throttle=80),
         step(
             24.5,
-            "the crash check holds it: an error that stays until it is armed again",
+            "the crash check selects HOLD: an error until it is armed again",
             (0, "Crash: Going to HOLD"),
             custom_mode=4,
             throttle=0,
         ),
         step(26.5, "the driver disarms", armed=False),
-        step(27.5, "the link is cut: soon nothing is known any more", action=Action.SILENCE),
+        step(27.5, "the link is cut: the status soon becomes unknown", action=Action.SILENCE),
         step(32.5, "the link is back, and so is the status", action=Action.RESUME),
         step(34.0, "the end", action=Action.END),
     ),

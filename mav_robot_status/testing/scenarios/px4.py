@@ -1,4 +1,4 @@
-"""PX4 on a quadrotor. It sends texts only to a link on which it hears a ground station."""
+"""PX4 on a quadrotor. It sends texts only to a link with a ground station."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def _scenario(title: str, *steps: Step) -> Scenario:
     return Scenario(title, PX4_QUAD, PX4_QUAD.ready, steps)
 
 
-READY = _scenario("disarmed in POSCTL on the ground, ready to be armed; nothing happens by itself")
+READY = _scenario("disarmed in POSCTL on the ground, ready to be armed; no steps")
 BOOT = Scenario("power on until ready to be armed", PX4_QUAD, PX4_QUAD.booting, PX4_QUAD.boot)
 PREARM_FAILING = _scenario(
-    "cannot be armed for a while: UNINIT is an ordinary state that says so",
+    "cannot be armed for a while: UNINIT reports it",
     step(
         2.0,
         "the remote control is off: not ready",

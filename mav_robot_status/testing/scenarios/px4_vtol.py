@@ -1,4 +1,4 @@
-"""PX4 on a VTOL: type 22. It sends texts only to a link on which it hears a ground station."""
+"""PX4 on a VTOL: type 22. It sends texts only to a link with a ground station."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ TO_WINGS, TO_ROTORS, HOVERING, ON_WINGS = 1, 2, 3, 4
 
 _TO_THE_WINGS = (
     step(3.0, "armed in AUTO.VTOL_TAKEOFF", armed=True, custom_mode=VTOL_TAKEOFF),
-    step(5.0, "up on its rotors", (6, "Takeoff detected\t"), landed_state=TAKEOFF, velocity=(0.0, 0.0, -1.5)),
-    step(8.0, "off on its wings", landed_state=IN_AIR, vtol_state=TO_WINGS, velocity=(8.0, 0.0, 0.0), throttle=70),
+    step(5.0, "takes off on its rotors", (6, "Takeoff detected\t"), landed_state=TAKEOFF, velocity=(0.0, 0.0, -1.5)),
+    step(
+        8.0, "transition to its wings", landed_state=IN_AIR, vtol_state=TO_WINGS, velocity=(8.0, 0.0, 0.0), throttle=70
+    ),
     step(11.0, "on its wings, in AUTO.MISSION", custom_mode=MISSION, vtol_state=ON_WINGS, velocity=(18.0, 0.0, 0.0)),
 )
 
@@ -22,9 +24,9 @@ def _scenario(title: str, *steps: Step) -> Scenario:
     return Scenario(title, PX4_VTOL, PX4_VTOL.ready, steps)
 
 
-READY = _scenario("disarmed in POSCTL on the ground, ready to be armed; nothing happens by itself")
+READY = _scenario("disarmed in POSCTL on the ground, ready to be armed; no steps")
 TRANSITION = _scenario(
-    "a mission up on its rotors, there on its wings, back on its rotors",
+    "a mission: takes off on its rotors, flies on its wings, returns to its rotors",
     *_TO_THE_WINGS,
     step(15.0, "back on its rotors", vtol_state=TO_ROTORS, velocity=(5.0, 0.0, 0.0)),
     step(18.0, "POSCTL: the pilot hovers", custom_mode=POSCTL, vtol_state=HOVERING, velocity=_STILL),

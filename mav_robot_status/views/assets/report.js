@@ -1,23 +1,26 @@
 "use strict";
-// Everything that came from a log is hostile: it only ever becomes a text node or a number.
+// Data from a log is hostile. It becomes a text node or a number, nothing else.
 
-// What turns the direction of writing, or cannot be seen, is shown as a box.
+// Invisible characters and those that change the writing direction are shown as a box.
 const UNSEEN = /[\u0000-\u001f\u007f-\u009f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]/g;
 const clean = (value) => typeof value === "string" ? value.replace(UNSEEN, "\ufffd") : value;
 
 const DATA = JSON.parse(document.getElementById("data").textContent, (_, value) => clean(value));
 const SVG = "http://www.w3.org/2000/svg";
-const ROW = 24, TOP = 4, BODY = 16; // px: a row, and what is drawn in it
+const ROW = 24, TOP = 4, BODY = 16; // px: the height of a row, and of the drawing in it
 const FINE = 2, CELL = 3; // px: an interval narrower than FINE is drawn together with its neighbours, in cells
-const SHORTEST = 1000; // microseconds: the most that one can zoom in
+const SHORTEST = 1000; // microseconds: the limit of zoom
 const STEPS = [1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 5e6, 1e7, 15e6, 3e7, 6e7, 12e7, 3e8, 6e8, 9e8,
   18e8, 36e8, 72e8, 108e8, 216e8, 432e8, 864e8, 1728e8, 6048e8, 2592e9, 7776e9, 31536e9];
-const FIELDS = [ // track, how its TRUE is drawn
+const FIELDS = [ // track, class of its TRUE
   ["link"], ["flight_mode"], ["mode"], ["armed", "on"], ["drives_powered", "on"], ["motion_possible", "on"],
   ["in_motion", "on"], ["e_stopped", "stop"], ["in_error", "alarm"],
 ];
-const MORE = 1000; // rows of the table of changes that are shown at once
-const MOST_CYCLES = 50; // that are listed
+for (const name of new Set(DATA.logs.flatMap((log) => log.vehicles.flatMap(({ tracks }) => Object.keys(tracks))))) {
+  if (!FIELDS.some(([known]) => known === name)) FIELDS.push([name, "on"]);
+}
+const MORE = 1000; // rows that the table of changes adds at once
+const MOST_CYCLES = 50; // arm cycles listed
 
 // -- words -------------------------------------------------------------------------------------------------------------
 
@@ -83,7 +86,7 @@ function widthOf(text) {
   return widths.get(text);
 }
 
-function label(kind, x, width, text, y = 16) { // as much of a text as there is room for
+function label(kind, x, width, text, y = 16) { // the text, cut to the width
   const room = width - 9, whole = widthOf(text);
   if (room < 16 || !text) return [];
   const letters = whole <= room ? text.length : Math.floor(text.length * (room - 10) / whole);
@@ -91,7 +94,7 @@ function label(kind, x, width, text, y = 16) { // as much of a text as there is 
   return [draw("text", { class: kind, x: x + 5, y }, letters < text.length ? `${text.slice(0, letters)}…` : text)];
 }
 
-// How a value is drawn: not by colour alone. TRUE fills the row, FALSE is a rail, UNKNOWN is hatched.
+// The drawing of a value. Not only the colour differs: TRUE fills the row, FALSE is a rail, UNKNOWN is hatched.
 function figure(row, span, x, width, right) {
   const from = Math.max(0, x), seen = Math.min(right, x + width) - from;
   switch (span.value) {
@@ -121,14 +124,14 @@ function texture(row, cell, x, width) {
 
 // -- one log -----------------------------------------------------------------------------------------------------------
 
-class Clock { // of a log: where it was set there is a gap between two segments
+class Clock { // the clock of a log; where it was set there is a gap between two segments
   constructor(segments) {
     this.segments = segments;
     const length = Math.max(segments.length ? segments[segments.length - 1][1] : 0, SHORTEST);
     this.gap = segments.length > 1 ? Math.round(length * 0.02) : 0;
     this.length = length + this.gap * (segments.length - 1);
   }
-  index(at) { // of the segment in which something begins
+  index(at) { // the segment in which an interval begins
     let low = 0, high = this.segments.length - 1;
     while (low < high) {
       const middle = (low + high + 1) >> 1;
@@ -137,7 +140,7 @@ class Clock { // of a log: where it was set there is a gap between two segments
     return low;
   }
   shift(start) { return this.index(start) * this.gap; }
-  find(place) { // the segment at a place of the picture, and the log's own time there; null in a gap
+  find(place) { // the segment at a place of the drawing, and the time of the log there; null in a gap
     for (let i = this.segments.length - 1; i >= 0; i--) {
       const at = place - i * this.gap, [start, end] = this.segments[i];
       if (at >= start && (at <= end || i === this.segments.length - 1)) return { i, at };
@@ -164,7 +167,7 @@ class Log {
 
   string(number) { return this.data.strings[number]; }
 
-  spans(packed) { // four numbers each: since the last one's end, length, value or text, why
+  spans(packed) { // four numbers each: gap, length, value or text, evidence
     const spans = [];
     for (let i = 0, at = 0; i < packed.length; i += 4) {
       const start = at + packed[i], [rule, source] = this.string(packed[i + 3]) || [];
@@ -207,7 +210,7 @@ class Log {
         make("div", { class: "tools" }, this.range,
           button("−", "Zoom out (-)", () => this.zoom(2)), button("+", "Zoom in (+)", () => this.zoom(0.5)),
           button("Whole flight", "Whole flight (0)", () => this.show(0, clock.length)))),
-      count ? this.chart : make("p", {}, "No autopilot was heard in this log."),
+      count ? this.chart : make("p", {}, "This log has no heartbeat of an autopilot."),
       ...data.vehicles.map((v) => totalsOf(this, v)), count ? new Changes(this).element : null);
     this.listen();
   }
@@ -287,7 +290,7 @@ class Log {
     this.range.textContent = shown >= whole ? "" : `${duration(shown)} of ${duration(whole)}`;
   }
 
-  step() { // the finest for whose words there is room
+  step() { // the smallest step with room for its labels
     const room = (step) => step < 1e6 ? 100 : step < 6e7 ? 80 : 66;
     return STEPS.find((s) => (this.to - this.from) / s * room(s) <= this.width) || STEPS[STEPS.length - 1];
   }
@@ -371,16 +374,16 @@ class Log {
   }
 
   drawSpan(row, span, x, wide) {
-    if (x < -20) { wide += x + 20; x = -20; } // patterns far outside cost time
+    if (x < -20) { wide += x + 20; x = -20; } // patterns far outside the view cost time
     wide = Math.min(wide, this.width + 40 - x);
     const figures = figure(row, span, x, wide, this.width);
-    if (row.reason && x >= 0) { // a mark that is seen however short the cause was
+    if (row.reason && x >= 0) { // a mark that is visible even for a short cause
       figures.push(draw("path", { class: `mark ${row.on}`, d: `M${Math.max(4, x) - 4} 1h8l-4 7z` }));
     }
     return figures;
   }
 
-  // -- moving about
+  // -- zoom and scroll
 
   show(from, to) {
     const whole = this.clock.length, length = Math.min(whole, Math.max(SHORTEST, to - from));
@@ -406,7 +409,7 @@ class Log {
     this.chart.addEventListener("wheel", (event) => {
       if (!inside(event)) return;
       const across = Math.abs(event.deltaX) > Math.abs(event.deltaY);
-      // A wheel over a page scrolls it. It zooms over the time axis, where one has clicked, and with Ctrl.
+      // The wheel scrolls the page. It zooms over the time axis, after a click, and with Ctrl.
       if (!across && !event.ctrlKey && !event.metaKey && !event.target.closest(".axis")
         && !this.chart.contains(document.activeElement)) return;
       event.preventDefault();
@@ -433,7 +436,7 @@ class Log {
       const other = [...this.pointers].find(([id]) => id !== event.pointerId);
       const was = this.pointers.get(event.pointerId);
       this.pointers.set(event.pointerId, to);
-      if (other) { // two fingers: the places under them stay under them
+      if (other) { // two fingers: the drawing follows both
         const apart = Math.max(8, Math.abs(was - other[1])), now = Math.max(8, Math.abs(to - other[1]));
         this.zoom(apart / now, this.place(other[1]));
       } else {
@@ -466,7 +469,7 @@ class Log {
     });
   }
 
-  rowKey(row, key) { // true if the key was for the row
+  rowKey(row, key) { // true if the row handles the key
     const last = row.spans.length - 1, here = this.rows.indexOf(row);
     const step = { ArrowLeft: row.chosen - 1, ArrowRight: row.chosen + 1, Home: 0, End: last }[key];
     if (step !== undefined) {
@@ -503,7 +506,7 @@ class Log {
     document.getElementById("live").textContent = this.describe(row, span).join(". ");
   }
 
-  // -- telling
+  // -- the inspector
 
   hover(row, x) {
     const place = this.place(Math.min(Math.max(0, x), this.width));
@@ -524,7 +527,7 @@ class Log {
     panel.classList.add("shown");
   }
 
-  describe(row, span) { // what, when, why
+  describe(row, span) { // value, time, evidence
     const name = row.title || row.id, many = this.data.vehicles.length > 1 ? `vehicle ${row.vehicle.name}, ` : "";
     const state = row.reason ? "active" : row.on && span.value === "TRUE" ? row.word(span) : span.value;
     const from = this.clock.unix(span.start), lasted = duration(span.end - span.start);
@@ -536,7 +539,7 @@ class Log {
   }
 }
 
-function firstAfter(spans, place) { // the first that ends after the place
+function firstAfter(spans, place) { // the first span that ends after the place
   let low = 0, high = spans.length;
   while (low < high) {
     const middle = (low + high) >> 1;
@@ -581,9 +584,9 @@ function totalsOf(log, vehicle) {
     return us ? [duration(us), make("span", { class: "share" }, percent(us, watched))] : "0 s";
   };
   const time = (at) => utc(log.clock.unix(at + log.clock.shift(at)), 1e6);
-  const fields = ["armed", "drives_powered", "motion_possible", "in_motion", "e_stopped", "in_error"];
+  const fields = FIELDS.filter(([, drawn]) => drawn).map(([name]) => name);
   const parts = [
-    table(`Time in each state, of ${duration(watched)} since it was first heard`,
+    table(`Time in each state, of ${duration(watched)} since the first heartbeat`,
       ["field", "#TRUE", "#FALSE", "#UNKNOWN"],
       fields.map((name) => [name, lasted(name, "TRUE"), lasted(name, "FALSE"), lasted(name, "UNKNOWN")])),
     table("Time in each mode, and without link", ["field", "#time"], [
@@ -610,7 +613,7 @@ function totalsOf(log, vehicle) {
     make("div", { class: "totals" }, ...parts));
 }
 
-class Changes { // every change as text: for search, for a screen reader
+class Changes { // every change as text, for search and for screen readers
   constructor(log) {
     this.log = log;
     this.rows = log.rows.flatMap((row) => row.spans.flatMap((span, i) => this.ofSpan(row, span, row.spans[i - 1])));
@@ -633,7 +636,7 @@ class Changes { // every change as text: for search, for a screen reader
     }
     const goesOn = before && before.end === span.start;
     const next = row.spans[span.index + 1];
-    const begins = [span.start, row, goesOn ? `${name} goes on, with another text` : `${name} begins`, why];
+    const begins = [span.start, row, goesOn ? `${name} continues with another text` : `${name} begins`, why];
     return next && next.start === span.end ? [begins] : [begins, [span.end, row, `${name} ends`, ""]];
   }
   add() {
@@ -667,7 +670,7 @@ const keys = [["wheel on the axis or Ctrl+wheel", "zoom"], ["drag", "move"], ["d
   ["+ − 0", "zoom, whole flight"], ["← →", "move, or step through a focused row"]];
 document.getElementById("footer").append(make("p", { class: "help" },
   ...keys.flatMap(([key, does]) => [make("kbd", {}, key), ` ${does}   `])), make("p", {}, `Made by ${DATA.by}. `
-  + "UNKNOWN is not FALSE: it was not told. The status informs; it is no safety function."));
+  + "UNKNOWN is not FALSE. The status is information, not a safety function."));
 
 document.addEventListener("keydown", (event) => {
   if (!active || event.ctrlKey || event.metaKey || event.altKey || event.target.closest("button, summary, a")) return;
@@ -682,7 +685,7 @@ const resized = new ResizeObserver(() => logs.forEach((log) => log.redraw()));
 logs.forEach((log) => { resized.observe(log.utc.plot); log.redrawNow(); });
 matchMedia("print").addEventListener("change", () => logs.forEach((log) => log.redrawNow()));
 const views = new Map();
-addEventListener("beforeprint", () => { // paper shows the whole flight
+addEventListener("beforeprint", () => { // print the whole flight
   for (const log of logs) {
     views.set(log, [log.from, log.to]);
     log.from = 0;

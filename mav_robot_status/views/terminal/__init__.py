@@ -1,4 +1,4 @@
-"""`watch`: a live table in the terminal. `render` makes lines of a state, rich paints them, `show` turns the loop."""
+"""`watch`: a live table in the terminal. `render` turns a state into lines, rich adds colours, `show` runs the loop."""
 
 from .show import show
 

@@ -1,4 +1,4 @@
-"""Keys: the bytes that a terminal sends for them, and what they change."""
+"""Keys: the bytes that a terminal sends for them, and their actions."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ PANES: Final[dict[str, PaneName]] = {
     "help": "help",
 }
 LONGEST: Final = 32
-"""Bytes of an escape sequence; a longer one is none."""
+"""The limit on the bytes of an escape sequence."""
 
 
 class Keyboard:
-    """Cuts what was typed into keys. A sequence may come in pieces; a lone Escape is known by what does not follow."""
+    """Splits input into keys. A sequence may arrive in pieces. An Escape without further bytes is the Escape key."""
 
     def __init__(self) -> None:
         self._rest = b""
@@ -40,7 +40,7 @@ class Keyboard:
         return bool(self._rest)
 
     def feed(self, data: bytes) -> list[str]:
-        """The actions of the keys that are complete; of none where a key has no meaning."""
+        """The actions of the complete keys. A key without an action is ignored."""
         self._rest += data
         found = []
         while self._rest:
@@ -54,13 +54,13 @@ class Keyboard:
         return found
 
     def flush(self) -> list[str]:
-        """The action of what is not complete and does not go on."""
+        """The action of an incomplete sequence after which no byte follows."""
         rest, self._rest = self._rest, b""
         return [ACTIONS[rest]] if rest in ACTIONS else []
 
 
 def _length(data: bytes) -> int | None:
-    """Bytes of the first key; None if more must come."""
+    """The number of bytes of the first key; None if it is incomplete."""
     if not data.startswith(ESCAPE):
         return 1
     if len(data) == 1:
@@ -68,7 +68,7 @@ def _length(data: bytes) -> int | None:
     if data[1:2] == b"O":
         return 3 if len(data) >= 3 else None
     if data[1:2] != b"[":
-        return 1  # Escape, and another key
+        return 1  # Escape, followed by another key
     for i in range(2, min(len(data), LONGEST)):
         if 0x40 <= data[i] <= 0x7E:
             return i + 1
@@ -76,7 +76,7 @@ def _length(data: bytes) -> int | None:
 
 
 def press(state: State, action: str, rows: int, page: int) -> State:
-    """The state after a key; `rows` and `page` are the lines of the table and of the pane."""
+    """The state after an action. `rows` and `page` are the heights of the table and of the pane."""
     ui = state.ui
     if action in PANES:
         pane = PANES[action]
@@ -89,7 +89,7 @@ def press(state: State, action: str, rows: int, page: int) -> State:
     if not state.vehicles:
         return state
     index = min(max(0, _index(state, action, rows)), len(state.vehicles) - 1)
-    # what all vehicles did does not begin anew with another one
+    # these panes do not depend on the selected vehicle
     scroll = ui.scroll if index == state.place or ui.pane in ("all transitions", "help") else 0
     return state._replace(ui=ui._replace(handle=state.vehicles[index].handle, scroll=scroll))
 
@@ -98,6 +98,6 @@ def _index(state: State, action: str, rows: int) -> int:
     index, count = state.place, len(state.vehicles)
     if action == "problem":
         order = [(index + i) % count for i in range(1, count + 1)]
-        return next((i for i in order if state.vehicles[i].needs_a_look), index)
+        return next((i for i in order if state.vehicles[i].has_problem), index)
     moves = {"down": 1, "up": -1, "page down": rows, "page up": -rows, "first": -count, "last": count}
     return index + moves.get(action, 0)

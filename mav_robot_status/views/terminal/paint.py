@@ -1,4 +1,4 @@
-"""From a line's spans to what the terminal is sent: with rich in its colours, without it as plain text."""
+"""Turns the spans of a line into terminal output: with colours if rich is installed, otherwise as plain text."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ STYLES: Final[Mapping[Style, str]] = {
     "cause": "bold red",
     "warning": "yellow",
 }
-"""What the styles look like: colours of the terminal's own palette, so that they suit light and dark ones."""
+"""The look of each style. The colours are those of the terminal's palette, which suits light and dark themes."""
 
 
 def painter() -> Callable[[Line], str]:
-    """How to paint for the terminal that standard output is. `NO_COLOR` leaves bold, dim and reverse."""
+    """The function that paints lines for the terminal on standard output. `NO_COLOR` leaves bold, dim and reverse."""
     try:
         from rich.console import COLOR_SYSTEMS, Console
         from rich.style import Style as RichStyle

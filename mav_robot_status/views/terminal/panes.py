@@ -1,11 +1,12 @@
-"""What stands below the table: the details of the chosen vehicle, its explanation, the last changes, or the help."""
+"""The pane below the table: the details of the selected vehicle, its explanation, the last changes, or the help."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from ...interface import STATES
 from .state import duration, seconds_since
-from .table import TRI_STATES, mode, tri_state
+from .table import TITLES, shown
 from .text import Line, Span, cells, clean, fill, wrap
 
 if TYPE_CHECKING:
@@ -14,19 +15,20 @@ if TYPE_CHECKING:
     from .state import Change, State
     from .text import Style
 
+FIELDS: Final = {field.name: field for field in STATES}
 LABEL: Final = 9
-"""Cells of the words in front of the details."""
+"""Width of the labels of the details, in cells."""
 NARROW: Final = 60
-"""The width below which explanations stand below their fields."""
+"""The width below which an explanation has its own line below its field."""
 
 
 def pane(state: State, width: int) -> list[Line]:
-    """All lines of the pane that the person has chosen."""
+    """All lines of the selected pane."""
     return list(PANES[state.ui.pane](state, width))
 
 
 def title(state: State) -> str:
-    """What the pane is about."""
+    """The title of the pane."""
     chosen = state.chosen
     if state.ui.pane == "help":
         return "help"
@@ -54,7 +56,7 @@ def _detail(state: State, width: int) -> Iterator[Line]:
     vehicle = state.chosen
     if vehicle is None:
         yield ()
-        yield (Span(" No autopilot is heard yet.", "bold"),)
+        yield (Span(" No heartbeat of an autopilot yet.", "bold"),)
         for part in wrap(clean(state.advice), width - 2):
             yield (Span(" " + part),)
         return
@@ -65,7 +67,7 @@ def _detail(state: State, width: int) -> Iterator[Line]:
         yield from _labelled("error", f"{error['code']} {_cause(error, state)}", width, "cause")
     for inhibit in line["inhibits"]:
         yield from _labelled("no motion", _cause(inhibit, state), width)
-    age = "never heard" if vehicle.age is None else f"last heartbeat {duration(vehicle.age)} ago"
+    age = "no heartbeat yet" if vehicle.age is None else f"last heartbeat {duration(vehicle.age)} ago"
     yield from _labelled("link", f"{vehicle.link}, {age}", width)
     if vehicle.rates:
         each = ", ".join(f"{name} {rate:.1f}" for name, rate in sorted(vehicle.rates.items()))
@@ -76,25 +78,25 @@ def _detail(state: State, width: int) -> Iterator[Line]:
 def _verdict(line: Any) -> str:
     """The status as a sentence."""
     if line["link"]["state"] != "CONNECTED":
-        return "No heartbeat comes: nothing is known of it."
+        return "No heartbeat: its state is unknown."
     parts = [
-        {True: "It can move", False: "It cannot move", None: "Whether it can move is not known"}[
+        {True: "It can move", False: "It cannot move", None: "It is unknown whether it can move"}[
             line["motion_possible"]
         ],
         {"AUTO": "a program is in charge", "MANUAL": "a person is in charge"}.get(
-            line["mode"], "who is in charge is not known"
+            line["mode"], "it is unknown who is in charge"
         ),
     ]
     if line["e_stopped"]:
-        parts.append("an emergency stop is engaged")
+        parts.append("the emergency stop is engaged")
     if line["in_error"]:
-        parts.append("something is wrong")
+        parts.append("it has an error")
     return ", ".join(parts[:-1]) + f" and {parts[-1]}."
 
 
 def _cause(cause: Any, state: State) -> str:
-    said = f': "{clean(cause["text"])}"' if cause["text"] else ""
-    return f"{clean(cause['name'])} for {duration(seconds_since(cause['since'], state.now))}{said}"
+    text = f': "{clean(cause["text"])}"' if cause["text"] else ""
+    return f"{clean(cause['name'])} for {duration(seconds_since(cause['since'], state.now))}{text}"
 
 
 # -- explanation -------------------------------------------------------------------------------------------------------
@@ -102,14 +104,14 @@ def _cause(cause: Any, state: State) -> str:
 
 def _explain(state: State, width: int) -> Iterator[Line]:
     if state.explanation is None:
-        heard = state.chosen is not None and state.chosen.age is not None
-        yield (Span(" One moment ..." if heard else " It was never heard, so there is nothing to explain."),)
+        seen = state.chosen is not None and state.chosen.age is not None
+        yield (Span(" One moment ..." if seen else " No heartbeat yet: there is nothing to explain."),)
         return
     for name, field in state.explanation["fields"].items():
-        value = mode(field["value"], state.glyphs) if name == "mode" else tri_state(name, field["value"], state.glyphs)
+        value = shown(FIELDS[name], field["value"], state.glyphs)
         age = "" if field["age"] is None else f"{field['age']:.1f} s"
         source = f"  [{clean(field['source'])}]" if field["source"] else ""
-        why = f"{clean(field['rule'] or 'the hardware does not tell')}{source}"
+        why = f"{clean(field['rule'] or 'the hardware gives no reason')}{source}"
         front = (
             Span(" " + fill(name, 16)),
             Span(fill(value.text, 7), value.style),
@@ -129,12 +131,12 @@ def _explain(state: State, width: int) -> Iterator[Line]:
 
 def _transitions(state: State, width: int) -> Iterator[Line]:
     if not state.changes:
-        yield (Span(" Nothing has changed within the last ten minutes."),)
+        yield (Span(" No change in the last ten minutes."),)
     yield from changes(state, state.ui.pane == "all transitions")
 
 
 def changes(state: State, several: bool) -> list[Line]:
-    """The changes, the latest first; with the names of the vehicles if they are of several."""
+    """The changes, the latest first. `several` adds the name of each vehicle."""
     return [
         (
             Span(f" {clock(change.stamp)} {duration(state.now.mono - change.at):>4} ago  ", "soft"),
@@ -149,9 +151,9 @@ def changes(state: State, several: bool) -> list[Line]:
 def _value(change: Change, state: State) -> Line:
     name, value = change.name, change.value
     if isinstance(value, dict):
-        said = f': "{clean(value["text"])}"' if value["text"] and value["begins"] else ""
+        text = f': "{clean(value["text"])}"' if value["text"] and value["begins"] else ""
         begins = "begins  " if value["begins"] else "ends    "
-        return Span(begins), Span(clean(value["name"]) + said, "cause" if name == "error" and value["begins"] else "")
+        return Span(begins), Span(clean(value["name"]) + text, "cause" if name == "error" and value["begins"] else "")
     now = _word(name, value, state)
     if change.before is None:
         return (now,)
@@ -159,10 +161,8 @@ def _value(change: Change, state: State) -> Line:
 
 
 def _word(name: str, value: Any, state: State) -> Span:
-    if name == "mode":
-        return mode(value, state.glyphs)
-    if name in TRI_STATES:
-        return tri_state(name, value, state.glyphs)
+    if name in FIELDS:
+        return shown(FIELDS[name], value, state.glyphs)
     return Span(clean(value if value is not None else "none"))
 
 
@@ -173,19 +173,21 @@ def clock(stamp: str) -> str:
 
 # -- help --------------------------------------------------------------------------------------------------------------
 
+
+def _title(name: str) -> str:
+    """The title of a field's column in a terminal of 80 columns, or its last word if that is too long."""
+    words = TITLES[name][0][1].replace("|", " ").strip() if name in TITLES else name
+    return words if len(words) <= LABEL else words.rpartition(" ")[2]
+
+
 HELP: Final = (
-    ("keys", "up down j k PgUp PgDn Home End: choose a vehicle;  n: the next one with something wrong"),
-    ("", "e: why each value;  t: its last changes;  T: those of all;  Esc: details;  ?: this help"),
-    ("", "In these, PgUp and PgDn turn their pages.  q: end;  Ctrl-L: draw anew"),
-    ("values", "{yes} YES, {no} no, {unknown} unk: the vehicle does not tell; that never means no"),
-    ("mode", "AUTO: a program decides the next motion, MANUAL: a person's sticks do"),
-    ("e-stop", "e_stopped: an emergency stop is engaged and must be released first"),
-    ("power", "drives_powered: armed, and nothing blocks the actuators"),
-    ("can move", "motion_possible: a motion command would be carried out"),
-    ("in motion", "in_motion: it moves or turns, or it is airborne"),
-    ("in error", "in_error: at least one cause is active; the last column names it"),
-    ("link age", "since the last heartbeat; {lost}: the link is lost, so nothing is known"),
-    ("", "Times are UTC. The status informs. It is no safety function."),
+    ("keys", "Up Down j k PgUp PgDn Home End: select a vehicle;  n: next problem"),
+    ("", "e: why each value;  t: its last changes;  T: changes of all;  Esc: details;  ?: this help"),
+    ("", "In these panes PgUp and PgDn scroll.  q: quit;  Ctrl-L: redraw"),
+    ("values", "{yes} YES, {no} no, {unknown} unk: unknown, which never means no"),
+    *((_title(name), f"{name}: {field.row.meaning}") for name, field in FIELDS.items()),
+    ("link age", "time since the last heartbeat; {lost}: link lost, the state is unknown"),
+    ("", "Times are UTC. The status is information, not a safety function."),
 )
 
 

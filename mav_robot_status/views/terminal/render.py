@@ -1,4 +1,4 @@
-"""The whole screen as lines: a value, made of a state and the size of the terminal."""
+"""The whole screen as lines: a pure function of a state and the size of the terminal."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ if TYPE_CHECKING:
     from .text import Style
 
 PROGRAM: Final = "mav-robot-status"
-KEYS: Final = (("e", "explain"), ("t", "changes"), ("?", "help"), ("q", "end"))
-KEYS_OF_SEVERAL: Final = (("j/k", "choose"), ("n", "next problem"))
+KEYS: Final = (("e", "explain"), ("t", "changes"), ("?", "help"), ("q", "quit"))
+KEYS_OF_SEVERAL: Final = (("j/k", "select"), ("n", "next problem"))
 SMALL: Final = 16
-"""The height below which the log has no strip and the titles one line."""
+"""The height below which the log is hidden and the titles have one line."""
 MOST_DETAILS: Final = 9
-"""Lines of details that are kept free below a long table."""
+"""Lines reserved for the details below a long table."""
 
 LEAST_CONNECTION: Final = 12
-"""Cells below which nothing is said of it."""
+"""Cells below which the connection is not shown."""
 LEAST_TITLE: Final = 24
-"""Cells that the rule keeps for what the pane is about."""
+"""Cells that the rule reserves for the title of the pane."""
 
 
 class Layout(NamedTuple):
-    """How many lines each part has; all together are the height."""
+    """The number of lines of each part."""
 
     head: int
     rows: int
@@ -37,7 +37,7 @@ class Layout(NamedTuple):
 
 
 def layout(state: State, width: int, height: int) -> Layout:
-    """The parts; besides them there are the first line, the rule above the pane, and the keys."""
+    """The parts. Three more lines have the status, the rule above the pane, and the keys."""
     small = height < SMALL
     head = 1 if small else 2
     log = 0 if small else 2 if height < 32 else 4
@@ -51,7 +51,7 @@ def layout(state: State, width: int, height: int) -> Layout:
 
 
 def settled(state: State, width: int, height: int) -> State:
-    """The state with a vehicle chosen that is there, and a pane that is scrolled no further than it goes."""
+    """The state with an existing vehicle selected and the scroll position within the pane."""
     chosen = state.chosen
     parts = layout(state, width, height)
     most = max(0, len(pane(state, width)) - parts.pane) if state.ui.scroll else 0
@@ -70,7 +70,7 @@ def render(state: State, width: int, height: int) -> list[Line]:
     below = pane(state, width)
     seen = below[state.ui.scroll :][: parts.pane]
     lines.append(_rule(state, width, top, parts, len(below)))
-    if state.ui.pane == "detail" and len(seen) < parts.pane:  # what room is left shows what has changed last
+    if state.ui.pane == "detail" and len(seen) < parts.pane:  # the last changes fill the rest
         seen = [*seen, (), *changes(state, several=False)][: parts.pane]
     lines += [fill_line(line, width, state.glyphs) for line in seen]
     lines += [fill_line((), width)] * (parts.pane - len(seen))
@@ -80,7 +80,7 @@ def render(state: State, width: int, height: int) -> list[Line]:
 
 
 def _first(state: State, width: int) -> Line:
-    """Where from, how many vehicles, what is wrong with them, and the time."""
+    """The first line: the connection, the number of vehicles and problems, and the time."""
     time = f" {clock(rfc3339(state.now.unix_us))[:8]}Z "
     counts = _counts(state)
     room = width - sum(cells(span.text) for span in counts) - len(time)
@@ -108,7 +108,7 @@ def _counts(state: State) -> list[Span]:
 
 
 def _rule(state: State, width: int, top: int, parts: Layout, lines: int) -> Line:
-    """The line between table and pane; it tells which part of each is seen."""
+    """The line between table and pane. It shows which part of each is visible."""
     rule = state.glyphs.rule
     words = title(state)
     where = []
@@ -148,7 +148,7 @@ def _keys(state: State, width: int) -> Line:
     if state.ui.pane != "detail":
         keys.insert(0, ("Esc", "details"))
     while sum(len(key) + len(words) + 3 for key, words in keys) > width + 1 and len(keys) > 1:
-        del keys[0]  # the last ones tell how to get help, and out
+        del keys[0]  # help and quit come last, and stay
     spans = []
     for key, words in keys:
         spans += [Span(" " + key, "bold"), Span(f" {words} ", "soft")]

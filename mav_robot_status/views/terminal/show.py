@@ -1,4 +1,4 @@
-"""Shows what a source knows: on a screen with keys, or, where there is none, as one line for each change."""
+"""Shows a source: on a screen with keys, or without a terminal as one line for each change."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     from .text import Glyphs
 
 TICK: Final = 0.1
-"""Seconds from a change to the screen, at most."""
+"""The longest delay from a change to the screen, in seconds."""
 AGES: Final = 0.5
-"""Seconds until what only grows older is drawn anew."""
+"""Seconds between two updates of the ages."""
 MOST_CHANGES: Final = 500
-"""Changes that the pane has, of however many vehicles."""
+"""The limit on changes in the pane, over all vehicles."""
 LINE_WIDTH: Final = 1000
-"""Cells that a line may take where there is no screen: at most 4000 bytes."""
+"""The width of a line without a screen, in cells. It takes at most 4000 bytes."""
 LINE_NAME: Final = 7
-"""Cells of the ids there: `255.255`."""
+"""The width of the ids in such a line: `255.255`."""
 
 
 class Row(Protocol):
-    """What the source knows of one vehicle."""
+    """One vehicle of a source."""
 
     @property
     def line(self) -> Mapping[str, Any]:
@@ -44,11 +44,11 @@ class Row(Protocol):
 
     @property
     def stamp(self) -> str:
-        """When it was so, RFC 3339."""
+        """The time of the status, RFC 3339."""
 
     @property
     def version(self) -> int:
-        """Another number for every change."""
+        """A number that differs after every change."""
 
     @property
     def age(self) -> float | None:
@@ -56,41 +56,41 @@ class Row(Protocol):
 
     @property
     def rates(self) -> Mapping[str, float]:
-        """Hz of the messages that its status is made of, by name."""
+        """The rate (Hz) of each message that its status depends on, by name."""
 
 
 class Source(Protocol):
-    """Where the statuses come from."""
+    """The source of the statuses."""
 
     connection: str
-    """Where MAVLink comes from, as the person wrote it."""
+    """The MAVLink connection, as on the command line."""
     advice: str
-    """What to do if no vehicle is heard."""
+    """A remedy, shown until the first heartbeat."""
     explained: str
-    """The handle that is to be explained from now on; empty: none."""
+    """The handle to explain; empty: none."""
 
     @property
     def version(self) -> int:
-        """Another number for every change of any vehicle."""
+        """A number that differs after every change of any vehicle."""
 
     def now(self) -> Instant:
-        """The present."""
+        """The current time."""
 
     def wait(self, seconds: float) -> bool:
-        """Whether it ends within so many seconds."""
+        """Wait; return whether the source ends within these seconds."""
 
     def rows(self) -> Sequence[Row]:
         """The vehicles, in the order of the table."""
 
     def changes(self, handles: Sequence[str], most: int) -> Sequence[tuple[str, Change]]:
-        """The latest changes of these vehicles, the latest first, each with the handle."""
+        """The changes of these vehicles, each with its handle, the latest first."""
 
     def explanation(self) -> Mapping[str, Any] | None:
-        """The latest explanation of what is to be explained."""
+        """The latest explanation of the handle `explained`."""
 
 
 def show(source: Source) -> None:
-    """Show it until it ends, or the person ends it (a key, or a signal as KeyboardInterrupt)."""
+    """Show a source until it ends or the user quits (by a key, or by a signal as KeyboardInterrupt)."""
     glyphs = UNICODE if locale.nl_langinfo(locale.CODESET).upper().replace("-", "") == "UTF8" else ASCII
     if is_screen():
         strip = Strip()
@@ -102,7 +102,7 @@ def show(source: Source) -> None:
 
 
 class _Show:
-    """The loop: keys change the state, and what has changed is drawn."""
+    """The loop: it applies keys to the state and draws changes."""
 
     def __init__(self, source: Source, screen: Screen, strip: Strip, glyphs: Glyphs) -> None:
         self._source = source
@@ -115,7 +115,7 @@ class _Show:
         self._drawn: object = None
 
     def run(self) -> None:
-        """Until the source ends, the person does, or the terminal is gone."""
+        """Run until the source ends, the user quits, or the terminal is closed."""
         while not self._source.wait(0.0):
             self._draw()
             typed = self._screen.wait(TICK)
@@ -140,7 +140,7 @@ class _Show:
         self._source.explained = state.ui.handle if state.ui.pane == "explain" else ""
 
     def _draw(self) -> None:
-        """Draw, if anything may have changed."""
+        """Draw the screen if anything may have changed."""
         size = self._screen.size()
         now = self._source.now()
         seen = (size, self._ui, self._strip.count, self._source.version, now.mono // AGES)
@@ -177,10 +177,10 @@ class _Show:
 
 
 def show_lines(source: Source, descriptor: int, glyphs: Glyphs) -> None:
-    """One row of the table for each change of a vehicle, with the time; the titles come first.
+    """Print the titles, then one row of the table with the time for each change of a vehicle.
 
-    A reader that is too slow is not waited for: when it reads again it gets the latest. Raises BrokenPipeError once
-    nobody reads.
+    This never waits for a slow reader, which gets the latest status when it reads again. Raises BrokenPipeError after
+    the reader has closed its end.
     """
     shape = table.table(LINE_WIDTH, [], glyphs)._replace(size=table.NORMAL, name_width=LINE_NAME)
     above, titles = table.head(shape)
@@ -204,8 +204,8 @@ def show_lines(source: Source, descriptor: int, glyphs: Glyphs) -> None:
 
 
 def _has_room(reader: select.poll) -> bool:
-    """Whether a line can be written without waiting (a pipe that takes anything takes 4096 bytes)."""
+    """Whether a write of one line does not block. A writable pipe has room for 4096 bytes."""
     events = reader.poll(0)
     if events and events[0][1] & (select.POLLERR | select.POLLHUP | select.POLLNVAL):
-        raise BrokenPipeError("the reader of the table has gone")
+        raise BrokenPipeError("the reader of the table has closed its end")
     return bool(events)

@@ -1,4 +1,4 @@
-"""What the screen shows, as values: the vehicles, what the person has chosen, and the last lines of the log."""
+"""The content of the screen as values: the vehicles, the user's selection, and the last lines of the log."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ PaneName = Literal["detail", "explain", "transitions", "all transitions", "help"
 
 
 class Ui(NamedTuple):
-    """What the person has chosen."""
+    """The user's selection."""
 
     handle: str = ""
-    """Of the chosen vehicle; if there is none such, the first one is chosen."""
+    """The handle of the selected vehicle. Without a match the first vehicle is selected."""
     pane: PaneName = "detail"
     scroll: int = 0
-    """The first line of the pane that is seen."""
+    """The first visible line of the pane."""
 
 
 class Change(Protocol):
-    """One member of a vehicle's status became another value."""
+    """A change of one member of a vehicle's status."""
 
     @property
     def at(self) -> float:
@@ -46,7 +46,7 @@ class Change(Protocol):
 
     @property
     def before(self) -> Any:
-        """The value that it had; None for unknown, too."""
+        """The previous value; None also for UNKNOWN."""
 
 
 class Vehicle(NamedTuple):
@@ -55,9 +55,9 @@ class Vehicle(NamedTuple):
     line: Mapping[str, Any]
     """Its status: the members of a native JSON line."""
     age: float | None
-    """Seconds since the last heartbeat; None: never heard."""
+    """Seconds since the last heartbeat; None: no heartbeat yet."""
     rates: Mapping[str, float] = {}
-    """Hz of the messages that its status is made of, by name."""
+    """The rate (Hz) of each message that its status depends on, by name."""
 
     @property
     def handle(self) -> str:
@@ -66,7 +66,7 @@ class Vehicle(NamedTuple):
 
     @property
     def name(self) -> str:
-        """`1.1`; the handle while the ids are not known."""
+        """`1.1`; the handle while the ids are unknown."""
         system, component = self.line["system"], self.line["component"]
         return self.handle if system is None else f"{system}" if component is None else f"{system}.{component}"
 
@@ -76,8 +76,8 @@ class Vehicle(NamedTuple):
         return str(self.line["link"]["state"])
 
     @property
-    def needs_a_look(self) -> bool:
-        """Whether something is wrong with it: an error, an emergency stop, no link."""
+    def has_problem(self) -> bool:
+        """Whether it has an error, an emergency stop or no link."""
         return bool(self.line["in_error"] or self.line["e_stopped"] or self.link != "CONNECTED")
 
 
@@ -87,44 +87,44 @@ class Logged(NamedTuple):
     unix_us: int
     text: str
     serious: bool = False
-    """A warning or worse."""
+    """Whether its level is WARNING or higher."""
 
 
 class State(NamedTuple):
-    """Everything that the screen shows."""
+    """The content of the screen."""
 
     connection: str
-    """Where MAVLink comes from, as the person wrote it."""
+    """The MAVLink connection, as on the command line."""
     now: Instant
     vehicles: tuple[Vehicle, ...] = ()
     ui: Ui = Ui()
     explanation: Mapping[str, Any] | None = None
-    """Of the chosen vehicle, while the pane shows it; None: not there yet, or never heard."""
+    """The explanation of the selected vehicle, for its pane; None: not available yet, or no heartbeat yet."""
     changes: tuple[tuple[str, Change], ...] = ()
-    """Each with the name of its vehicle, the latest first, while the pane shows them."""
+    """The changes for the pane, each with the name of its vehicle, the latest first."""
     log: tuple[Logged, ...] = ()
     advice: str = ""
-    """What to do if no vehicle is heard."""
+    """A remedy, shown until the first heartbeat."""
     glyphs: Glyphs = UNICODE
 
     @property
     def place(self) -> int:
-        """The place of the chosen vehicle; 0 if there is none."""
+        """The index of the selected vehicle; 0 without vehicles."""
         return next((i for i, vehicle in enumerate(self.vehicles) if vehicle.handle == self.ui.handle), 0)
 
     @property
     def chosen(self) -> Vehicle | None:
-        """The chosen vehicle."""
+        """The selected vehicle."""
         return self.vehicles[self.place] if self.vehicles else None
 
 
 def seconds_since(stamp: str, now: Instant) -> float:
-    """Seconds from an RFC 3339 stamp of our own clock until now."""
+    """Seconds from an RFC 3339 stamp of this computer's clock until now."""
     return now.unix_us / 1e6 - datetime.fromisoformat(stamp.replace("Z", "+00:00")).timestamp()
 
 
 def duration(seconds: float) -> str:
-    """`12s`, `3m`, `5h`, `2d`: at most four characters for whatever is less than 27 years."""
+    """`12s`, `3m`, `5h`, `2d`: at most four characters up to 27 years."""
     whole = max(0, int(seconds))
     for unit, size, most in (("s", 1, 100), ("m", 60, 100), ("h", 3600, 48)):
         if whole < size * most:

@@ -1,4 +1,4 @@
-"""The log while the screen is ours: the last lines are kept for the strip at the bottom."""
+"""The log during `watch`: a strip at the bottom of the screen shows its last lines."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ KEPT: Final = 50
 
 
 class Strip(logging.Handler):
-    """Keeps the last lines of the log."""
+    """A log handler that holds the last KEPT lines."""
 
     def __init__(self) -> None:
         super().__init__()
         self._lines: deque[Logged] = deque(maxlen=KEPT)
         self.count = 0
-        """Lines that came so far."""
+        """The number of lines so far."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep a line; of a traceback its first."""
+        """Add a record, without its traceback."""
         self._lines.append(Logged(round(record.created * 1e6), record.getMessage(), record.levelno >= logging.WARNING))
         self.count += 1
 
@@ -37,7 +37,7 @@ class Strip(logging.Handler):
 
     @contextlib.contextmanager
     def instead_of_stderr(self) -> Iterator[None]:
-        """Take the log, and leave standard error out of it if that is the terminal."""
+        """Receive the log. If standard error is a terminal, nothing is written to it meanwhile."""
         root = logging.getLogger()
         before = root.handlers[:]
         root.handlers[:] = [self] if sys.stderr.isatty() else [*before, self]

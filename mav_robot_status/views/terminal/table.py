@@ -1,9 +1,10 @@
-"""The table: one row a vehicle. Which columns there are, and how wide, depends on the terminal's width alone."""
+"""The table: one row for each vehicle. The columns and their widths depend on the terminal's width only."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from ...interface import STATES, Field, Kind
 from .state import Vehicle, duration
 from .text import Line, Span, cells, clean, clip, fill, fill_line
 
@@ -12,47 +13,81 @@ if TYPE_CHECKING:
 
     from .text import Glyphs, Style
 
+    Cell = Callable[[Vehicle, int, Glyphs], Span]
+
 NARROW, NORMAL, WIDE, WIDEST = range(4)
 FROM: Final = (0, 70, 118, 150)
-"""The widths of a terminal from which on these sizes are used."""
+"""The smallest terminal width of each size."""
 LONGEST_NAME: Final = 12
 LEAST_WHY: Final = 6
-"""Cells below which the reasons are left to the pane."""
-TRI_STATES: Final = ("e_stopped", "drives_powered", "motion_possible", "in_motion", "in_error")
+"""The width below which only the pane shows the reasons."""
 ALARMING: Final[dict[str, Style]] = {"e_stopped": "stop", "in_error": "alarm"}
 WORDS: Final = {True: "YES", False: "no", None: "unk"}
+
+
+Titles = tuple[str, str, str, str]
+Widths = tuple[int, int, int, int]
 
 
 class Column(NamedTuple):
     """One column, in each of the four sizes."""
 
-    titles: tuple[str, str, str, str]
-    """Two lines, parted by a bar."""
-    widths: tuple[int, int, int, int]
-    """In cells; 0: not shown."""
-    cell: Callable[[Vehicle, int, Glyphs], Span]
-    """Of a vehicle, in so many cells at most."""
+    titles: Titles
+    """Two lines, separated by a bar."""
+    widths: Widths
+    """In cells; 0: the column is hidden."""
+    cell: Cell
+    """The content for a vehicle; the width is in cells."""
+
+
+TITLES: Final[dict[str, tuple[Titles, Widths]]] = {
+    "mode": (("|mode",) * 4, (4, 6, 6, 6)),
+    "e_stopped": (("e-|stop", "|e-stop", "e_|stopped", "e_|stopped"), (4, 6, 7, 7)),
+    "drives_powered": (("drv|powr", "drive|power", "drives_|powered", "drives_|powered"), (4, 5, 7, 7)),
+    "motion_possible": (("can|move", "can|move", "motion_|possible", "motion_|possible"), (4, 5, 8, 8)),
+    "in_motion": (("in|motn", "in|motion", "in_|motion", "in_|motion"), (4, 6, 6, 6)),
+    "in_error": (("in|err", "in|error", "in_|error", "in_|error"), (4, 5, 5, 5)),
+}
+"""Titles and widths of fields whose name is a poor title."""
+
+
+def shown(field: Field, value: Any, glyphs: Glyphs) -> Span:
+    """The JSON value of a field, as the table shows it."""
+    return mode(value, glyphs) if field.kind is Kind.MODE else tri_state(field.name, value, glyphs)
 
 
 def tri_state(field: str, value: bool | None, glyphs: Glyphs, tight: bool = False) -> Span:
-    """`● YES`, `○ no` or `? unk`: told by shape, word and style."""
+    """`● YES`, `○ no` or `? unk`. Symbol, word and style all differ."""
     symbol = {True: glyphs.yes, False: glyphs.no, None: glyphs.unknown}[value]
     style: Style = "unknown" if value is None else ALARMING.get(field, "on") if value else ""
     return Span(symbol + ("" if tight else " ") + WORDS[value], style)
 
 
 def mode(value: str, glyphs: Glyphs, width: int = 6) -> Span:
-    """AUTO, MANUAL (MAN where it is narrow), or unknown."""
+    """AUTO, MANUAL (MAN in a narrow column), or unknown."""
     if value == "UNKNOWN":
         return Span(f"{glyphs.unknown}unk" if width < 5 else f"{glyphs.unknown} unk", "unknown")
     return Span(value if len(value) <= width else value[:3], "bold" if value == "AUTO" else "")
 
 
-def _tri_state(field: str) -> Callable[[Vehicle, int, Glyphs], Span]:
-    return lambda vehicle, width, glyphs: tri_state(field, vehicle.line[field], glyphs, width < 5)
+def _column(field: Field) -> Column:
+    """The column of a field. Without a row in TITLES it shows the field's name, from size NORMAL up."""
+    head, _, tail = field.name.rpartition("_")
+    split = f"{head}_|{tail}" if head else f"|{tail}"
+    least = max(6, len(tail), len(head) + 1)
+    titles, widths = TITLES.get(field.name, (("", split, split, split), (0, least, least, least)))
+    return Column(titles, widths, _mode(field) if field.kind is Kind.MODE else _tri_state(field))
 
 
-def _text(group: str, name: str) -> Callable[[Vehicle, int, Glyphs], Span]:
+def _mode(field: Field) -> Cell:
+    return lambda vehicle, width, glyphs: mode(vehicle.line[field.name], glyphs, width)
+
+
+def _tri_state(field: Field) -> Cell:
+    return lambda vehicle, width, glyphs: tri_state(field.name, vehicle.line[field.name], glyphs, width < 5)
+
+
+def _text(group: str, name: str) -> Cell:
     return lambda vehicle, width, glyphs: Span(clean(vehicle.line[group][name] or ""))
 
 
@@ -74,16 +109,7 @@ def _rate(vehicle: Vehicle, width: int, glyphs: Glyphs) -> Span:
 COLUMNS: Final = (
     Column(("|type",) * 4, (0, 0, 0, 14), _text("vehicle", "type")),
     Column(("|flight mode",) * 4, (0, 12, 14, 16), _text("vehicle", "flight_mode")),
-    Column(("|mode",) * 4, (4, 6, 6, 6), lambda v, width, glyphs: mode(v.line["mode"], glyphs, width)),
-    Column(("e-|stop", "|e-stop", "e_|stopped", "e_|stopped"), (4, 6, 7, 7), _tri_state("e_stopped")),
-    Column(
-        ("drv|powr", "drive|power", "drives_|powered", "drives_|powered"), (4, 5, 7, 7), _tri_state("drives_powered")
-    ),
-    Column(
-        ("can|move", "can|move", "motion_|possible", "motion_|possible"), (4, 5, 8, 8), _tri_state("motion_possible")
-    ),
-    Column(("in|motn", "in|motion", "in_|motion", "in_|motion"), (4, 6, 6, 6), _tri_state("in_motion")),
-    Column(("in|err", "in|error", "in_|error", "in_|error"), (4, 5, 5, 5), _tri_state("in_error")),
+    *map(_column, STATES),
     Column(("link|age", "link|age", "link|age", "link|age"), (4, 5, 6, 6), _link),
     Column(("", "", "messages|", "messages|"), (0, 0, 8, 8), _rate),
 )
@@ -95,7 +121,7 @@ class Table(NamedTuple):
     size: int
     name_width: int
     why_width: int
-    """0: the reasons have no room."""
+    """0: there is no room for the reasons."""
     width: int
     glyphs: Glyphs
 
@@ -149,10 +175,9 @@ def row(shape: Table, vehicle: Vehicle, chosen: bool) -> Line:
 
 
 def why(line: Any, width: int, glyphs: Glyphs) -> list[Span]:
-    """The errors, then why it cannot move: with as many texts as there is room for, or names, or the first and how
-    many more."""
+    """The errors, then the inhibits: with texts if there is room, else names, else the first name and a count."""
     causes: list[tuple[Any, Style]] = [(cause, "cause") for cause in line["errors"]]
-    # those with a text say more than the others, DISARMED above all
+    # inhibits with a text first: they say more than a bare DISARMED
     causes += [(cause, "") for cause in sorted(line["inhibits"], key=lambda inhibit: inhibit["text"] is None)]
     if not causes:
         return []

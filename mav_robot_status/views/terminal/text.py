@@ -1,4 +1,4 @@
-"""Text as it stands in cells of a terminal: spans with a style's name, clipped and filled up to a width."""
+"""Text in terminal cells: spans with a style name, clipped and padded to a width."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 Style = Literal["", "soft", "bold", "head", "chosen", "on", "unknown", "stop", "alarm", "cause", "warning"]
-"""What a span means; `paint` knows what it looks like. Nothing is told by it that the text does not tell too."""
+"""The meaning of a span. `paint` defines its look. The text alone has the same information."""
 
 
 class Span(NamedTuple):
@@ -37,11 +37,11 @@ class Glyphs(NamedTuple):
 
 UNICODE: Final = Glyphs()
 ASCII: Final = Glyphs("*", "-", "?", ">", "x", "-", "~", utf8=False)
-"""For a terminal that does not speak UTF-8."""
+"""For a terminal without UTF-8."""
 
 
 def clean(text: object) -> str:
-    """What a peer or a person wrote, as one line that cannot steer the terminal, without characters of no width."""
+    """Untrusted text as one line without control characters and without characters of zero width."""
     if (known := str(text)).isascii() and known.isprintable():
         return known
     composed = unicodedata.normalize("NFC", known)
@@ -49,7 +49,7 @@ def clean(text: object) -> str:
 
 
 def cells(text: str) -> int:
-    """How many cells a clean text takes."""
+    """The width of a clean text, in cells."""
     return len(text) if text.isascii() else sum(_cells(character) for character in text)
 
 
@@ -58,7 +58,7 @@ def _cells(character: str) -> int:
 
 
 def head(text: str, width: int) -> str:
-    """As much of the beginning as takes at most `width` cells."""
+    """The longest prefix of at most `width` cells."""
     room = width
     for i, character in enumerate(text):
         room -= _cells(character)
@@ -68,7 +68,7 @@ def head(text: str, width: int) -> str:
 
 
 def clip(text: str, width: int, glyphs: Glyphs = UNICODE) -> str:
-    """The text in at most `width` cells; what is cut is marked."""
+    """The text in at most `width` cells. A mark shows a cut."""
     if cells(text) <= width:
         return text
     return head(text, width - 1) + glyphs.more if width > 0 else ""
@@ -96,7 +96,7 @@ def fill_line(spans: Iterable[Span], width: int, glyphs: Glyphs = UNICODE) -> Li
 
 
 def wrap(text: str, width: int) -> Iterator[str]:
-    """The text in lines of at most `width` cells, broken at spaces where there are some."""
+    """The text in lines of at most `width` cells, broken at spaces where possible."""
     line = ""
     for word in text.split(" "):
         if line and cells(line) + 1 + cells(word) <= width:
@@ -118,7 +118,7 @@ def plain(line: Line) -> str:
 
 
 def encode(text: str, glyphs: Glyphs) -> bytes:
-    """The bytes for the terminal: as wide as the text."""
+    """The bytes for the terminal. They have the width of the text."""
     if glyphs.utf8:
         return text.encode("utf-8", "replace")
     return "".join(c if c.isascii() else "?" * _cells(c) for c in text).encode("ascii")

@@ -1,4 +1,4 @@
-"""The terminal as a screen of our own: taken over, written to, and given back as it was, whatever happens."""
+"""The terminal in full-screen mode. It is restored in every case."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ if TYPE_CHECKING:
     from types import FrameType, TracebackType
 
 ENTER: Final = b"\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J"
-"""The other screen, no cursor, no wrapping of lines that are too long; empty."""
+"""Alternate screen, no cursor, no line wrap, clear."""
 LEAVE: Final = b"\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l"
 ENDS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end the program, as KeyboardInterrupt."""
+"""Signals that end the program. They raise KeyboardInterrupt."""
 READ_AT_ONCE: Final = 1024
 
 
 def is_screen() -> bool:
-    """Whether standard input and output are a terminal with a cursor that can be moved."""
+    """Whether standard input and output are a terminal with a movable cursor."""
     return sys.stdin.isatty() and sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown", "")
 
 
 class Screen:
-    """Standard input and output, as long as it is entered. Only in the main thread."""
+    """A context that uses standard input and output as a screen. Only for the main thread."""
 
     def __init__(self) -> None:
         self._in, self._out = sys.stdin.fileno(), sys.stdout.fileno()
         self._before: list[Any] = termios.tcgetattr(self._in)
         self._shown: list[bytes] = []
-        """What each line shows now; empty: nothing is known of the screen."""
+        """The lines on the screen; empty: unknown."""
         self._handlers: dict[int, Any] = {}
         self._suspend = False
         self._wake_read, self._wake_write = os.pipe()
@@ -55,7 +55,7 @@ class Screen:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         try:
-            for end in ENDS:  # it ends already
+            for end in ENDS:  # the program is already ending
                 signal.signal(end, signal.SIG_IGN)
         finally:
             self._give_back()
@@ -73,7 +73,7 @@ class Screen:
         return columns or 80, lines or 24
 
     def wait(self, seconds: float) -> bytes | None:
-        """What was typed within so many seconds; empty if nothing was, or the size changed. None: nobody is left."""
+        """Wait for input. Empty after `seconds` or a change of size; None if the terminal is closed."""
         ready = select.select([self._in, self._wake_read], [], [], seconds)[0]
         if self._wake_read in ready:
             os.read(self._wake_read, READ_AT_ONCE)
@@ -83,11 +83,11 @@ class Screen:
             return b""
         try:
             return os.read(self._in, READ_AT_ONCE) or None
-        except OSError:  # the terminal is gone
+        except OSError:  # the terminal is closed
             return None
 
     def show(self, lines: list[bytes]) -> bool:
-        """Write the lines that differ from those shown; False if the terminal takes nothing now, or is gone."""
+        """Write the lines that differ from those shown. False if the terminal does not accept output."""
         if len(lines) != len(self._shown):
             self._shown = []
         changed = [
@@ -101,11 +101,11 @@ class Screen:
         return True
 
     def forget(self) -> None:
-        """Draw everything the next time."""
+        """Redraw everything the next time."""
         self._shown = []
 
     def _write(self, data: bytes) -> bool:
-        """A terminal that is held (Ctrl-S), or far away on a bad line, is not waited for."""
+        """Write without waiting for a terminal that is stopped (Ctrl-S) or slow. False if nothing was written."""
         with contextlib.suppress(OSError):
             if select.select([], [self._out], [], 0)[1]:
                 while data:
@@ -124,7 +124,7 @@ class Screen:
             termios.tcsetattr(self._in, termios.TCSANOW, self._before)
 
     def _sleep(self) -> None:
-        """Ctrl-Z: give the terminal back, stop, and take it again when we go on."""
+        """Ctrl-Z: restore the terminal, stop the process, and set the terminal up again on SIGCONT."""
         self._suspend = False
         self._give_back()
         signal.signal(signal.SIGTSTP, signal.SIG_DFL)

@@ -1,4 +1,4 @@
-"""The command, its sender and its view of processes, for real and briefly."""
+"""Short real runs of the command, its sender and its process statistics."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def bench(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_list_has_every_case_or_those_that_are_asked_for() -> None:
+def test_the_list_has_every_case_or_the_selected_ones() -> None:
     assert [line.split()[0] for line in bench("--list").stdout.splitlines()] == list(CASES)
     assert bench("--list", "--only", "parse").stdout.split()[0] == "parse"
 
 
-def test_a_run_writes_the_same_as_table_and_as_json(tmp_path: pathlib.Path) -> None:
+def test_a_run_writes_the_same_results_as_a_table_and_as_json(tmp_path: pathlib.Path) -> None:
     done = bench("--quick", "--rounds", "2", "--only", "parse", "--out", str(tmp_path))
     assert done.stdout == (tmp_path / "results.md").read_text()
     (case,) = json.loads((tmp_path / "results.json").read_text())["cases"]
@@ -46,8 +46,8 @@ def test_a_run_writes_the_same_as_table_and_as_json(tmp_path: pathlib.Path) -> N
     assert all(len(row["values"]["ours"]) == len(row["values"]["pymavlink"]) == 2 for row in case["rows"])
 
 
-@pytest.mark.parametrize("rate", [4000, 40_000])  # with one system call a frame, and with some frames a call
-def test_frames_are_sent_in_order_over_and_over(receiver: socket.socket, rate: int) -> None:
+@pytest.mark.parametrize("rate", [4000, 40_000])  # one frame a system call, and several frames a call
+def test_frames_are_sent_in_order_in_a_loop(receiver: socket.socket, rate: int) -> None:
     with receiver:
         frames = workload.frames(16)
         sender = Sender(frames, receiver.getsockname()[1])
@@ -56,7 +56,7 @@ def test_frames_are_sent_in_order_over_and_over(receiver: socket.socket, rate: i
         assert [receiver.recv(300) for _ in range(sent)] == (frames * 3)[:40]
 
 
-def test_drops_and_what_waits_are_seen_in_the_kernels_table(receiver: socket.socket) -> None:
+def test_dropped_and_waiting_datagrams_are_read_from_the_kernels_table(receiver: socket.socket) -> None:
     with receiver:
         port = receiver.getsockname()[1]
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -84,7 +84,10 @@ def test_a_process_that_listens_is_fed_and_measured(tmp_path: pathlib.Path) -> N
         assert child.memory() > 1
 
 
-def test_a_process_that_ends_at_once_is_told_with_its_words() -> None:
-    with Child([sys.executable, "-c", "raise SystemExit('no such thing')"]) as child, pytest.raises(BenchError) as told:
+def test_a_process_that_ends_at_once_is_an_error_with_its_output() -> None:
+    with (
+        Child([sys.executable, "-c", "raise SystemExit('no such thing')"]) as child,
+        pytest.raises(BenchError) as raised,
+    ):
         child.listens(free_port())
-    assert "no such thing" in str(told.value)
+    assert "no such thing" in str(raised.value)

@@ -1,4 +1,4 @@
-"""Nothing does more work for a frame than it did when its baseline was written."""
+"""No counted call needs more instructions than its baseline."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from bench.guard import COUNTED, THIS_PYTHON, Verdict, baselines, compare
 from ...docs.documents import ROOT
 
 
-def test_nothing_needs_more_instructions_than_its_baseline() -> None:
+def test_no_call_needs_more_instructions_than_its_baseline() -> None:
     if THIS_PYTHON not in baselines():
         pytest.skip(f"no baseline for Python {THIS_PYTHON}; python -m bench.guard --update writes one")
-    # in a process of its own: what other tests have left in caches is not counted
+    # in a separate process: the caches of other tests do not change the count
     done = subprocess.run(
         [sys.executable, "-m", "bench.guard"], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
         env={**os.environ, "PYTHONHASHSEED": "0"},
@@ -25,7 +25,7 @@ def test_nothing_needs_more_instructions_than_its_baseline() -> None:
     assert all(name in done.stdout for name in COUNTED)
 
 
-def test_the_baseline_has_everything_that_is_counted() -> None:
+def test_the_baseline_has_every_counted_call() -> None:
     assert all(list(numbers) == list(COUNTED) for numbers in baselines().values())
 
 
@@ -34,5 +34,5 @@ def test_more_than_the_tolerance_is_worse(counted: float, worse: bool) -> None:
     assert Verdict("work", counted, 100.0).worse is worse
 
 
-def test_something_new_is_worse_until_it_is_in_the_baseline() -> None:
+def test_a_new_call_is_worse_until_it_is_in_the_baseline() -> None:
     assert [verdict.worse for verdict in compare({"new": 10.0}, {})] == [True]

@@ -16,7 +16,7 @@ CPU = "CPU per frame, us"
 
 
 def result(*targets: Target) -> dict[str, Any]:
-    """Three rounds in which the machine was slow once."""
+    """Three rounds; the machine is slow in one."""
     rounds: list[list[Sample | Skip]] = [
         [Sample("parsing", CPU, OURS, mine), Sample("parsing", CPU, PYMAVLINK, theirs), Skip("", "MAVSDK", "not there")]
         for mine, theirs in ((1.0, 10.0), (5.0, 40.0), (1.0, 9.0))
@@ -25,7 +25,7 @@ def result(*targets: Target) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("factor", "met"), [(1 / 8, True), (1 / 9, True), (1 / 10, False)])
-def test_a_ratio_is_taken_within_each_round_so_that_a_busy_machine_does_not_decide_it(factor: float, met: bool) -> None:
+def test_a_ratio_is_that_of_each_round_so_a_busy_machine_does_not_change_it(factor: float, met: bool) -> None:
     target = result(Target("parsing", CPU, "", at_most=factor, peer=PYMAVLINK))["targets"][0]
     assert (target["value"], target["met"]) == (pytest.approx(0.111, abs=0.012), met)
 
@@ -35,16 +35,16 @@ def test_an_absolute_target_limits_the_median(limit: float, met: bool) -> None:
     assert result(Target("parsing", CPU, "", at_most=limit))["targets"][0]["met"] is met
 
 
-def test_a_target_may_be_a_least_value() -> None:
+def test_a_target_may_be_a_minimum() -> None:
     assert result(Target("parsing", CPU, "", at_least=1.1))["targets"][0]["met"] is False
 
 
-def test_what_was_not_measured_is_neither_met_nor_missed() -> None:
+def test_a_target_without_a_measurement_is_neither_met_nor_missed() -> None:
     target = result(Target("parsing", CPU, "", at_most=1.0, peer="MAVSDK"))["targets"][0]
     assert (target["value"], target["met"]) == (None, None)
 
 
-def test_a_table_has_medians_with_the_extremes_ratios_and_who_was_not_there() -> None:
+def test_a_table_has_medians_with_extremes_ratios_and_missing_programs() -> None:
     text = render(whole(result(Target("parsing", CPU, "parsing: at most 1/9", at_most=1 / 9, peer=PYMAVLINK))))
     assert "| parsing: at most 1/9 | 1/9 pymavlink | yes |" in text
     assert "| parsing | CPU per frame, us | 1 (1-5) | 10 (9-40) | 1/9 |" in text
@@ -60,9 +60,9 @@ def whole(case: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def test_a_table_replaces_what_is_between_the_marks_of_a_page() -> None:
+def test_a_table_replaces_the_text_between_the_marks_of_a_page() -> None:
     assert into(f"before\n{BEGIN}old\n{END}after\n", "new\n") == f"before\n{BEGIN}new\n{END}after\n"
-    with pytest.raises(ValueError, match="no lines"):
+    with pytest.raises(ValueError, match="lacks the lines"):
         into("a page\n", "new\n")
 
 

@@ -1,4 +1,4 @@
-"""The traffic is what the numbers are said to be of."""
+"""The traffic has the properties that the results state."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bench import workload
-from mav_robot_status.hardware.kinds import WANTED_IDS
+from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.mavlink.framing import Parser
 
 
@@ -17,7 +17,7 @@ def frames() -> list[bytes]:
     return workload.frames()
 
 
-def test_it_is_80_frames_a_second_of_26_kinds_and_36_bytes_of_which_a_status_needs_every_sixth(
+def test_it_has_80_frames_a_second_of_26_types_and_36_bytes_and_a_status_needs_every_sixth(
     frames: list[bytes],
 ) -> None:
     ids = [int.from_bytes(frame[7:10], "little") for frame in frames]
@@ -31,7 +31,7 @@ def test_it_is_the_same_every_time(frames: list[bytes]) -> None:
     assert workload.frames() == frames
 
 
-def test_sent_over_and_over_it_has_no_gap(frames: list[bytes]) -> None:
+def test_a_loop_has_no_gap_in_the_sequence(frames: list[bytes]) -> None:
     parser = Parser(WANTED_IDS)
     for piece in workload.chunks(frames * 2):
         parser.feed(piece)
@@ -41,9 +41,9 @@ def test_sent_over_and_over_it_has_no_gap(frames: list[bytes]) -> None:
 def test_each_vehicle_of_a_fleet_has_its_own_sequence() -> None:
     made = workload.fleet(3)
     mav = dialect.MAVLink(None)
-    heard = [mav.parse_buffer(frame)[0] for frame in made[:30]]
-    assert [message.get_srcSystem() for message in heard] == [1, 2, 3] * 10
-    assert [message.get_seq() for message in heard[::3]] == list(range(10))
+    received = [mav.parse_buffer(frame)[0] for frame in made[:30]]
+    assert [message.get_srcSystem() for message in received] == [1, 2, 3] * 10
+    assert [message.get_seq() for message in received[::3]] == list(range(10))
     parser = Parser(WANTED_IDS)
     parser.feed(b"".join(made * 2))
     assert (parser.counters.frames, parser.counters.lost) == (2 * len(made), 0)
@@ -57,14 +57,14 @@ def test_a_log_has_the_time_before_each_frame(tmp_path: pathlib.Path) -> None:
     assert (len(stamps), stamps[-1] - stamps[0]) == (161, 2_000_000)
 
 
-def test_signed_frames_are_accepted_by_who_has_the_key() -> None:
+def test_a_receiver_with_the_key_accepts_signed_frames() -> None:
     key = bytes(range(32))
     mav = dialect.MAVLink(None)
     mav.signing.secret_key = key
-    heard = [mav.parse_buffer(frame)[0] for frame in workload.frames(20, key=key)]
-    assert all(message.get_signed() for message in heard)
+    received = [mav.parse_buffer(frame)[0] for frame in workload.frames(20, key=key)]
+    assert all(message.get_signed() for message in received)
 
 
-def test_what_is_saved_is_loaded(tmp_path: pathlib.Path, frames: list[bytes]) -> None:
+def test_saved_frames_can_be_loaded(tmp_path: pathlib.Path, frames: list[bytes]) -> None:
     workload.save(tmp_path / "frames", frames[:50])
     assert list(workload.load(tmp_path / "frames")) == frames[:50]

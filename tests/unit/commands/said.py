@@ -1,4 +1,4 @@
-"""A command line, taken apart by the command's own arguments."""
+"""Parses a command line with the arguments of its command."""
 
 from __future__ import annotations
 

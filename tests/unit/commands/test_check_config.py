@@ -10,7 +10,7 @@ from mav_robot_status.errors import ConfigError
 from .said import said
 
 
-def test_it_says_what_a_configuration_means(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_describes_a_configuration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = tmp_path / "c.yaml"
     config.write_text("links: [udp:127.0.0.1:14550]\n")
     assert run(said("check-config", str(config))) == 0
@@ -21,16 +21,16 @@ def test_it_says_what_a_configuration_means(tmp_path: Path, capsys: pytest.Captu
     ("publisher", "fault"),
     [
         ("{type: jsn}", "nothing is registered as 'jsn' in mav_robot_status.publishers; did you mean 'json'?"),
-        ("{type: json, pth: x}", "json: unknown option 'pth'; there are path, format and changes_only"),
-        ("{type: json, format: xml}", "json: format 'xml' is none of native, ros1, ros2"),
-        ("{type: json, changes_only: 7}", "json: changes_only must be true or false, not '7'"),
+        ("{type: json, pth: x}", "json: unknown option 'pth'; did you mean 'path'?"),
+        ("{type: json, format: xml}", "json: format: must be one of native, ros1, ros2, not 'xml'"),
+        ("{type: json, changes_only: 7}", "json: changes_only: must be true or false, not 7"),
         ("{type: mavlink, rate: 4}", "mavlink: unknown option 'rate'; there are none"),
         ("{type: mirror, rate: 4}", "mirror: unknown option 'rate'; there are none"),
-        ("{type: http, port: 1}", "http: unknown option 'port'; there are listen, token_file, open, hosts"),
+        ("{type: http, port: 1}", "http: unknown option 'port'; the options are listen, token_file, open, hosts"),
         ("{type: mqtt, url: broker}", "mqtt: "),
     ],
 )
-def test_a_fault_in_a_publishers_options_is_found_at_its_place(publisher: str, fault: str, tmp_path: Path) -> None:
+def test_a_fault_in_publisher_options_is_reported_with_its_position(publisher: str, fault: str, tmp_path: Path) -> None:
     config = tmp_path / "c.yaml"
     kind = "mav_robot_status/IndustrialRobotStatusController"
     config.write_text(f"mine:\n  type: {kind}\n  publishers:\n    - mavlink\n    - {publisher}\n")

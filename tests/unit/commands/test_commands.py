@@ -11,7 +11,7 @@ from mav_robot_status.commands import COMMANDS, command
 SHARED = {"__init__", "options", "overrides"}
 
 
-def test_every_row_is_a_module_and_every_module_a_row() -> None:
+def test_every_row_has_a_module_and_every_module_has_a_row() -> None:
     modules = {path.stem for path in Path(commands.__file__).parent.glob("*.py")}
     assert modules - SHARED == {name.replace("-", "_") for name in COMMANDS}
 

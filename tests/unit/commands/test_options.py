@@ -18,7 +18,7 @@ from .said import said
         ("doctor", "--seconds", "nan"),
     ],
 )
-def test_numbers_that_make_no_sense_are_usage_errors(
+def test_invalid_numbers_are_usage_errors(
     name: str, option: str, value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
@@ -27,6 +27,6 @@ def test_numbers_that_make_no_sense_are_usage_errors(
     assert repr(value) in capsys.readouterr().err
 
 
-def test_numbers_that_do_are_taken() -> None:
+def test_valid_numbers_are_accepted() -> None:
     options = said("run", "--rate", "2.5", "--system", "255", "--baud", "921600")
     assert (options.rate, options.system, options.baud) == (2.5, 255, 921600)

@@ -4,9 +4,12 @@ import argparse
 
 import pytest
 
-from mav_robot_status.commands.overrides import configured, mqtt_options, only, overridden, page_options, with_page
+from mav_robot_status.commands.options import given
+from mav_robot_status.commands.overrides import configured, only, overridden, with_publisher
 from mav_robot_status.config import Config, ControllerConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
 from mav_robot_status.errors import UsageError
+from mav_robot_status.publishers.mqtt.options import BrokerOptions
+from mav_robot_status.publishers.web.options import HttpOptions
 
 from .said import said
 
@@ -24,32 +27,32 @@ def test_without_options_the_configuration_stays_as_it_is() -> None:
     assert overridden(config, run()) == config
 
 
-def test_connections_and_outs_replace_those_of_the_file() -> None:
+def test_connection_and_out_options_replace_those_of_the_file() -> None:
     config = Config(links=(LinkConfig("udp:127.0.0.1:1"),), outs=(LinkConfig("127.0.0.1:2"),))
     changed = overridden(config, run("udp:127.0.0.1:3", "--out", "127.0.0.1:4", "--out", "127.0.0.1:5"))
     assert [link.url for link in changed.links] == ["udp:127.0.0.1:3"]
     assert [out.url for out in changed.outs] == ["127.0.0.1:4", "127.0.0.1:5"]
 
 
-def test_passive_concerns_the_vehicle_links_and_not_the_outs() -> None:
+def test_passive_applies_to_vehicle_links_and_not_to_outs() -> None:
     config = Config(links=(LinkConfig("udp:127.0.0.1:1"),), outs=(LinkConfig("127.0.0.1:2"),))
     changed = overridden(config, run("--passive"))
     assert changed.links[0].passive
     assert not changed.outs[0].passive
 
 
-def test_baud_is_for_serial_connections() -> None:
+def test_baud_applies_to_serial_connections() -> None:
     changed = overridden(Config(), run("/dev/ttyUSB0", "udp:127.0.0.1:1", "--baud", "115200"))
     assert [link.url for link in changed.links] == ["/dev/ttyUSB0,115200", "udp:127.0.0.1:1"]
 
 
-def test_the_rate_is_every_controllers() -> None:
+def test_the_rate_applies_to_every_controller() -> None:
     changed = overridden(Config(controllers=(SLOW, FAST)), run("--rate", "4"))
     assert [c.parameters["publish_rate"] for c in changed.controllers] == [4.0, 4.0]
     assert overridden(Config(), run("--rate", "0")).controllers[0].parameters["publish_rate"] == 0.0
 
 
-def test_json_options_go_to_the_json_publishers() -> None:
+def test_json_options_apply_to_the_json_publishers() -> None:
     changed = overridden(Config(controllers=(SLOW, FAST)), run("--json", "x", "--format", "ros2", "--changes-only"))
     assert changed.controllers[0].publishers == (PublisherConfig("mavlink"),)
     assert changed.controllers[1].publishers == (
@@ -57,12 +60,12 @@ def test_json_options_go_to_the_json_publishers() -> None:
     )
 
 
-def test_json_none_takes_the_json_publishers_away() -> None:
+def test_json_none_removes_the_json_publishers() -> None:
     changed = overridden(Config(), run("--json", "none"))
     assert [p.type for p in changed.controllers[0].publishers or ()] == ["mavlink", "mirror"]
 
 
-def test_a_json_target_adds_a_publisher_where_the_file_has_none() -> None:
+def test_a_json_target_adds_a_publisher_if_the_file_has_none() -> None:
     changed = overridden(Config(controllers=(SLOW,)), run("--json", "x"))
     assert changed.controllers[0].publishers == (PublisherConfig("json", {"path": "x"}), PublisherConfig("mavlink"))
 
@@ -76,18 +79,18 @@ def test_system_keeps_that_vehicle_and_its_controllers() -> None:
 
 
 @pytest.mark.parametrize("arguments", [("udp:127.0.0.1:1", "--out", "a.tlog"), ("a:1", "--out", "nothing")])
-def test_a_connection_that_cannot_be_is_an_error_for_the_person(arguments: tuple[str, ...]) -> None:
+def test_an_invalid_connection_is_a_user_error(arguments: tuple[str, ...]) -> None:
     with pytest.raises(UsageError):
         overridden(Config(), run(*arguments))
 
 
-def test_what_a_command_cannot_be_told_stays_as_it_is() -> None:
+def test_settings_without_a_command_line_option_stay_unchanged() -> None:
     config = Config(links=(LinkConfig("udp:127.0.0.1:1"),), controllers=(SLOW,), record="x", forward=True)
     for name in ("explain", "doctor", "watch"):
         assert overridden(config, said(name)) == config
 
 
-def test_the_key_of_the_command_line_leaves_the_rest_of_the_section() -> None:
+def test_the_signing_key_option_keeps_the_rest_of_the_section() -> None:
     section = SigningConfig("file.key", link_id=7)
     changed = overridden(Config(signing=section), run("--signing-key", "mine.key"))
     assert changed.signing == SigningConfig("mine.key", link_id=7)
@@ -99,7 +102,7 @@ def test_one_vehicle_of_a_configuration() -> None:
     assert only(config, 1) == Config(vehicles=config.vehicles[:1], controllers=(FAST,))
 
 
-def test_a_page_and_a_broker_replace_those_of_the_file() -> None:
+def test_page_and_broker_options_replace_those_of_the_file() -> None:
     there = PublisherConfig("http", {"listen": "127.0.0.1:1"}), PublisherConfig("mqtt", {"url": "mqtt://old/x"})
     config = Config(controllers=(ControllerConfig("c", OURS, {}, "f:1:1", there),))
     changed = overridden(config, run("--http", ":8765", "--mqtt", "mqtt://new/x", "--mqtt-robot", "r"))
@@ -109,28 +112,31 @@ def test_a_page_and_a_broker_replace_those_of_the_file() -> None:
     )
 
 
-def test_a_page_is_one_publisher_more() -> None:
-    (changed,) = with_page((SLOW,), said("demo", "--http", ":1", "--http-open"))
+def test_a_page_option_adds_a_publisher() -> None:
+    (changed,) = with_publisher("http", (SLOW,), said("demo", "--http", ":1", "--http-open"))
     assert changed.publishers == (PublisherConfig("mavlink"), PublisherConfig("http", {"listen": ":1", "open": True}))
-    assert with_page((SLOW,), said("demo")) == (SLOW,)
+    assert with_publisher("http", (SLOW,), said("demo")) == (SLOW,)
 
 
-def test_the_board_takes_the_same_options_without_those_of_a_gateway() -> None:
+def test_the_board_has_the_same_options_except_those_of_a_gateway() -> None:
     options = said("board", "mqtts://b/robots", "--mqtt-user", "u", "--http-token-file", "t")
-    assert mqtt_options(options, options.broker, ("user", "ca")) == {"url": "mqtts://b/robots", "user": "u"}
-    assert page_options(options) == {"listen": "127.0.0.1:8765", "token_file": "t"}
+    assert given(options, BrokerOptions) == {"url": "mqtts://b/robots", "user": "u"}
+    assert given(options, HttpOptions) == {"listen": "127.0.0.1:8765", "token_file": "t"}
 
 
 @pytest.mark.parametrize(
     ("arguments", "missing"),
     [
-        (("--http-token-file", "x"), "--http-token-file is for a web page: add --http "),
-        (("--http-open",), "--http-open is for a web page: add --http "),
-        (("--mqtt-robot", "x"), "--mqtt-robot is for a broker: add --mqtt "),
-        (("--mqtt-password-file", "x"), "--mqtt-password-file is for a broker: add --mqtt "),
+        (("--http-token-file", "x"), "--http-token-file needs --http HOST:PORT: serve a live web page"),
+        (("--http-open",), "--http-open needs --http HOST:PORT: serve a live web page"),
+        (("--mqtt-robot", "x"), "--mqtt-robot needs --mqtt URL: publish statuses"),
+        (
+            ("--mqtt-password-file", "x"),
+            "--mqtt-password-file needs --mqtt URL: publish statuses",
+        ),
     ],
 )
-def test_an_option_of_a_publisher_that_is_not_asked_for_is_no_option(arguments: tuple[str, ...], missing: str) -> None:
+def test_an_option_of_an_unused_publisher_is_a_usage_error(arguments: tuple[str, ...], missing: str) -> None:
     with pytest.raises(UsageError, match=missing):
         overridden(Config(), run(*arguments))
 
@@ -138,6 +144,6 @@ def test_an_option_of_a_publisher_that_is_not_asked_for_is_no_option(arguments: 
 @pytest.mark.parametrize(
     ("name", "example"), [("run", "mav-robot-status udp"), ("watch", "mav-robot-status watch udp")]
 )
-def test_without_a_connection_the_command_to_write_is_shown(name: str, example: str) -> None:
+def test_a_missing_connection_is_an_error_with_an_example_command(name: str, example: str) -> None:
     with pytest.raises(UsageError, match=f"no connection given; write for example {example}"):
         configured(said(name))

@@ -27,7 +27,7 @@ def test_a_log_is_replayed_alone(arguments: tuple[str, ...], told: str) -> None:
         run(said("run", "a.tlog", *arguments))
 
 
-def test_a_log_of_the_configuration_is_one_too(tmp_path: Path) -> None:
+def test_a_log_in_the_configuration_is_replayed_too(tmp_path: Path) -> None:
     config = tmp_path / "c.yaml"
     config.write_text("links: [a.tlog, udp:127.0.0.1:14550]\n")
     with pytest.raises(UsageError, match="a recorded log is replayed alone"):

@@ -1,4 +1,4 @@
-"""Files that are wrong: one line that says where, what, and what would be right."""
+"""Invalid files: one line with the position, the fault and the valid values."""
 
 from __future__ import annotations
 
@@ -18,8 +18,15 @@ OURS = "type: mav_robot_status/IndustrialRobotStatusController"
 EXAMPLES = [path.read_text(encoding="utf-8") for path in (Path(__file__).parents[3] / "config").glob("*.yaml")]
 PLACE = re.compile(r"f\.yaml:\d+:\d+: \S")
 
-# (the file, where, the rest of the message or its beginning)
+# (the file, the position, the rest of the message or its start)
 FAULTS = [
+    # hardware interfaces
+    ("hardware: [{name: x}]", "1:12", "hardware[0] has no 'type': write {type: mavlink}, or {type: ..., name: ...}"),
+    ("hardware: [{type: ur}, {type: ur}]", "1:24", "two hardware interfaces are named 'ur': give each its own 'name'"),
+    ("hardware: [{type: mavlink}, {type: mavlink}]", "1:29", "two MAVLink hardware interfaces: keep one, and write"),
+    ("hardware: [{type: mavlink, v_om: 1}]", "1:28", "hardware[0] has no key 'v_om': did you mean 'v_on'?"),
+    ("hardware: [{type: mavlink, v_on: 0.1}]", "1:34", "v_off (0.15 m/s) must be less than v_on (0.1 m/s)"),
+    ("hardware: [ur]", "1:12", "hardware[0] must be a mapping, not 'ur'"),
     # not YAML
     (
         "links:\n\t- a\n",
@@ -47,7 +54,7 @@ FAULTS = [
     ("coalesce: !!int many", "1:11", "'many' is no int: quote it if it is a text"),
     ("coalesce: " + "9" * 65, "1:11", "'" + "9" * 37 + "...' is too long for a number"),
     ("requests: none\x00", "1:15", "a control character: remove it"),
-    # the top
+    # top level
     ("- links", "1:1", "the configuration must be a mapping, not a list"),
     ("links", "1:1", "the configuration must be a mapping, not 'links'"),
     ("requests: none\nrequests: missing", "2:1", "the key 'requests' is there twice, first at 1:1: remove one"),
@@ -92,10 +99,10 @@ FAULTS = [
         "links[0] has no key 'pasive': did you mean 'passive'?",
     ),
     ("links:\n- {url: 'udp:127.0.0.1:1', passive: 1}", "2:37", "passive must be true or false, not 1"),
-    ("outs: [{url: 'udpout:127.0.0.1:1', passive: true}]", "1:36", "an out is there to be sent to: remove 'passive'"),
+    ("outs: [{url: 'udpout:127.0.0.1:1', passive: true}]", "1:36", "an out cannot be passive: remove 'passive'"),
     ("links:\n  - url: 'udp://:14540@127.0.0.1:14557'", "2:10", "'udp://:14540@127.0.0.1:14557' is MAVROS's form"),
     ("links: ['udp:127.0.0.1:99999']", "1:9", "'udp:127.0.0.1:99999': a port is 1 to 65535"),
-    ("outs: [flight.tlog]", "1:8", "'flight.tlog' is a log, and an out is sent to: write one like udpout:"),
+    ("outs: [flight.tlog]", "1:8", "'flight.tlog' is a log, and an out needs a receiver: write one like udpout:"),
     # vehicles, identity
     ("vehicles: [1]", "1:12", "vehicles[0] must be a mapping with the keys system, component, handle, not 1"),
     ("vehicles: [{system: 0}]", "1:21", "system must be a whole number from 1 to 255 or 'auto', not 0"),
@@ -188,7 +195,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("text", "place", "message"), FAULTS, ids=[fault[0][:40] for fault in FAULTS])
-def test_a_fault_is_one_line_with_its_place(text: str, place: str, message: str) -> None:
+def test_a_fault_is_one_line_with_its_position(text: str, place: str, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         build(parse_document(text, "f.yaml"))
     said = str(caught.value)
@@ -197,24 +204,24 @@ def test_a_fault_is_one_line_with_its_place(text: str, place: str, message: str)
     assert "\n" not in said
 
 
-def test_the_message_begins_with_the_name_of_the_file(tmp_path: Path) -> None:
+def test_the_message_starts_with_the_file_name(tmp_path: Path) -> None:
     path = tmp_path / "my robot.yaml"
     path.write_text("requests: none\nlinks: 5\n")
     with pytest.raises(ConfigError, match=re.escape(f"{path}:2:8: links must be a list")):
         load(path)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_the_error_names_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"nowhere\.yaml: cannot read the configuration: No such file"):
         load(tmp_path / "nowhere.yaml")
 
 
-def test_a_folder_is_not_a_configuration(tmp_path: Path) -> None:
+def test_a_directory_is_not_a_configuration(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot read the configuration: Is a directory"):
         load(tmp_path)
 
 
-def test_bytes_that_are_not_utf_8_are_placed(tmp_path: Path) -> None:
+def test_the_error_gives_the_position_of_invalid_utf_8(tmp_path: Path) -> None:
     path = tmp_path / "f.yaml"
     path.write_bytes("\ufefflinks: []\n# caf".encode() + b"\xe9\n")
     with pytest.raises(ConfigError, match=r"f\.yaml:2:6: not UTF-8 text"):
@@ -226,7 +233,7 @@ def test_an_endless_file_is_not_read_to_its_end() -> None:
         load("/dev/zero")
 
 
-def test_aliases_cannot_multiply() -> None:
+def test_nested_aliases_cannot_grow_without_bound() -> None:
     levels = "".join(f"l{i}: &l{i} [{', '.join([f'*l{i - 1}'] * 9)}]\n" for i in range(1, 12))
     with pytest.raises(ConfigError, match=r"f\.yaml:2:10: aliases"):
         build(parse_document("l0: &l0 [a]\n" + levels, "f.yaml"))
@@ -234,7 +241,7 @@ def test_aliases_cannot_multiply() -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(alphabet=st.sampled_from(list("ab01 \n\t:-[]{},'\"&*!|>%@#?.\\uUx_+~=<\r\x00\x85\u2028é"))))
-def test_whatever_is_written_raises_nothing_but_a_config_error(text: str) -> None:
+def test_any_text_loads_or_raises_a_config_error(text: str) -> None:
     check(text)
 
 
@@ -259,13 +266,13 @@ tree = st.recursive(
 
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(KEYS.split("|")), tree), max_size=5))
-def test_whatever_the_sections_hold_raises_nothing_but_a_config_error(sections: list[tuple[str, str]]) -> None:
+def test_any_section_content_loads_or_raises_a_config_error(sections: list[tuple[str, str]]) -> None:
     check("\n".join(f"{key}: {value}" for key, value in sections))
 
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.sampled_from(EXAMPLES), st.data())
-def test_an_example_with_pieces_cut_or_moved_raises_nothing_but_a_config_error(text: str, data: st.DataObject) -> None:
+def test_a_mutated_example_loads_or_raises_a_config_error(text: str, data: st.DataObject) -> None:
     for _ in range(data.draw(st.integers(1, 3))):
         start, end, to = (data.draw(st.integers(0, len(text))) for _ in range(3))
         piece = data.draw(st.sampled_from([text[start : start + 20], "", "[", "\n", "\t", " 5", "null", "\x00"]))

@@ -1,9 +1,10 @@
-"""Files that are right: what they mean, in values and in words."""
+"""Valid files: the values they give and their description."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+import textwrap
 from dataclasses import fields
 from pathlib import Path
 from typing import get_args, get_type_hints
@@ -22,7 +23,7 @@ from mav_robot_status.config import (
     load,
 )
 from mav_robot_status.errors import ConfigError
-from mav_robot_status.hardware.options import HardwareOptions
+from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.interface import RobotMode
 from mav_robot_status.mavlink.signing import UNSIGNED_IDS
 
@@ -36,7 +37,7 @@ CONTRACT = """\
     vehicles:
       - {system: 1, handle: industrial_robot_status_handle}
     identity: {system: auto, component: 192}
-    hardware: {heartbeat_timeout: 3.5, hover_is_motion: true}        # the options of design/semantics.md 12
+    hardware: {heartbeat_timeout: 3.5, hover_is_motion: true}
     requests: missing                                                # or none
 
     robot_status_controller:                            # any other top-level mapping with a type is a controller
@@ -78,7 +79,7 @@ def test_every_example_loads_and_is_described(path: Path) -> None:
         assert any(line.startswith(f"controller {controller.name}: ") for line in lines)
 
 
-def test_the_stanza_of_the_contract_means_what_the_contract_says(tmp_path: Path) -> None:
+def test_the_stanza_of_the_contract_has_the_documented_meaning(tmp_path: Path) -> None:
     config = loaded(tmp_path, CONTRACT)
     publishers = (PublisherConfig("json"), PublisherConfig("mavlink"))
     assert config == Config(
@@ -102,11 +103,9 @@ def test_the_stanza_of_the_contract_means_what_the_contract_says(tmp_path: Path)
     )
 
 
-def test_the_stanza_of_the_contract_is_the_one_in_the_contract() -> None:
-    contract = Path(__file__).parents[4] / "shared" / "design" / "contract.md"
-    if not contract.exists():
-        pytest.skip("the contract is not beside this checkout")
-    assert CONTRACT in contract.read_text(encoding="utf-8")
+def test_the_stanza_of_the_contract_is_the_one_in_the_document() -> None:
+    contract = Path(__file__).parents[3] / "docs" / "reference" / "contract.md"
+    assert textwrap.dedent(CONTRACT) in contract.read_text(encoding="utf-8")
 
 
 def test_a_stanza_pasted_from_ros_control_loads(tmp_path: Path) -> None:
@@ -121,7 +120,7 @@ def test_a_stanza_pasted_from_ros_control_loads(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["", "\n", "# nothing\n", "---\n", "---\n...\n", "{}", "links:\nhardware:\n", "\ufeff"]
 )
-def test_an_empty_file_is_the_defaults(tmp_path: Path, text: str) -> None:
+def test_an_empty_file_gives_the_defaults(tmp_path: Path, text: str) -> None:
     assert loaded(tmp_path, text) == Config()
 
 
@@ -187,7 +186,7 @@ def test_auto_and_any_are_none(tmp_path: Path) -> None:
     assert config.identity == IdentityConfig(None, 192, True)
 
 
-def test_signing_needs_a_key_and_no_more(tmp_path: Path) -> None:
+def test_signing_requires_only_a_key(tmp_path: Path) -> None:
     config = loaded(tmp_path, "signing: {key_file: vehicle.key}")
     assert config.signing == SigningConfig("vehicle.key", "radio_status", 192)
     config = loaded(tmp_path, "signing: {key_file: ~/vehicle.key, accept_unsigned: none, link_id: 0}")
@@ -200,7 +199,7 @@ def test_a_recording_is_a_file_or_none(tmp_path: Path, text: str, path: str | No
 
 
 @pytest.mark.parametrize("text", ["1", "[a.tlog]", "{}"])
-def test_a_recording_that_is_no_text_is_refused(tmp_path: Path, text: str) -> None:
+def test_a_recording_that_is_not_a_string_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(ConfigError, match="record must be a text"):
         loaded(tmp_path, f"record: {text}")
 
@@ -215,7 +214,7 @@ def test_without_signing_there_is_none(tmp_path: Path) -> None:
     assert loaded(tmp_path, "signing: none").signing is None
 
 
-def test_the_words_for_unsigned_frames_are_those_of_the_verifier() -> None:
+def test_the_values_for_unsigned_frames_equal_those_of_the_verifier() -> None:
     assert get_args(get_type_hints(SigningConfig)["accept_unsigned"]) == tuple(UNSIGNED_IDS)
 
 
@@ -242,13 +241,13 @@ def test_a_publisher_may_have_options(tmp_path: Path) -> None:
     assert controller.publishers == (PublisherConfig("json"), second)
 
 
-def test_the_parameters_of_another_type_are_its_own_affair(tmp_path: Path) -> None:
+def test_the_parameters_of_another_controller_type_are_not_checked(tmp_path: Path) -> None:
     (controller,) = loaded(tmp_path, "mine: {type: theirs/Controller, publish_rate: fast, day: 2026-11-20}").controllers
     assert controller.parameters == {"publish_rate": "fast", "day": "2026-11-20"}
     assert controller.publishers is None
 
 
-def test_the_outputs_of_another_type_are_read_like_ours(tmp_path: Path) -> None:
+def test_the_outputs_of_another_controller_type_are_read_as_usual(tmp_path: Path) -> None:
     config = loaded(tmp_path, "mine: {type: other/Controller, publishers: [{type: json, path: a.jsonl}], x: 1}")
     assert config.controllers[0].publishers == (PublisherConfig("json", {"path": "a.jsonl"}),)
     assert config.controllers[0].parameters["x"] == 1
@@ -286,7 +285,7 @@ three: {type: theirs/Controller, colour: red}
     ]
 
 
-def test_nothing_is_described_as_the_defaults() -> None:
+def test_an_empty_configuration_is_described_by_the_defaults() -> None:
     assert describe(Config()) == [
         "link: none in the file; give one on the command line",
         "vehicle: every autopilot that is heard, each with a handle of its own",
@@ -299,3 +298,22 @@ def test_nothing_is_described_as_the_defaults() -> None:
 def test_yaml_is_imported_only_when_a_file_is_read() -> None:
     code = "import sys, mav_robot_status.config as c; c.Config(); sys.exit('yaml' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# -- hardware interfaces -----------------------------------------------------------------------------------------------
+
+
+def test_a_hardware_list_holds_the_mavlink_options_and_the_other_interfaces(tmp_path: Path) -> None:
+    text = "hardware:\n  - {type: mavlink, v_on: 0.4}\n  - {type: ur, name: arm, port: 30004}\n  - {type: ur2}\n"
+    config = loaded(tmp_path, text)
+    assert config.hardware.v_on == 0.4
+    arm, second = config.interfaces
+    assert (arm.type, arm.name, arm.options) == ("ur", "arm", {"port": 30004})
+    assert arm.where.endswith(":3:5")
+    assert (second.name, second.options) == ("ur2", {})
+    assert "hardware: 'arm' of type ur (port: 30004)" in describe(config)
+
+
+def test_mavlink_is_received_with_links_or_without_other_interfaces(tmp_path: Path) -> None:
+    links, arm = "links: ['udp:127.0.0.1:1']\n", "hardware: [{type: ur}]\n"
+    assert [loaded(tmp_path, text).hears_mavlink for text in ("", links, links + arm, arm)] == [True, True, True, False]

@@ -9,11 +9,10 @@ import pytest
 
 from mav_robot_status.config import Config, VehicleConfig
 from mav_robot_status.errors import UsageError
-from mav_robot_status.gateway.plant import Plant
-from mav_robot_status.gateway.recorded import Recording
-from mav_robot_status.gateway.replay import Nobody, replay, run_through
-from mav_robot_status.hardware.kinds import WANTED_IDS
-from mav_robot_status.link.log import Stamped
+from mav_robot_status.gateway.recorded_log import Recording
+from mav_robot_status.gateway.replay import ReplayPipeline, replay, run_through
+from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+from mav_robot_status.links.log import Stamped
 from mav_robot_status.mavlink.definitions import Heartbeat, MessageInterval
 from mav_robot_status.mavlink.encode import encode
 
@@ -35,8 +34,8 @@ def log_of(path: Path, *seconds: float) -> str:
     return str(path)
 
 
-def plant_of(stdout: TextIO) -> Plant:
-    return Plant(Config(), Nobody(), stdout, patient=True)
+def pipeline_of(stdout: TextIO) -> ReplayPipeline:
+    return ReplayPipeline(Config(), stdout)
 
 
 def replayed(path: str, stdout: TextIO) -> list[dict[str, Any]]:
@@ -45,7 +44,7 @@ def replayed(path: str, stdout: TextIO) -> list[dict[str, Any]]:
     return [json.loads(line) for line in stdout]
 
 
-def test_lines_continue_through_a_gap_as_they_would_live(tmp_path: Path, stdout: TextIO) -> None:
+def test_lines_continue_through_a_gap_as_in_a_live_run(tmp_path: Path, stdout: TextIO) -> None:
     lines = replayed(log_of(tmp_path / "a.tlog", 0, 1, 2, 12, 13), stdout)
     states = [line["link"]["state"] for line in lines]
     assert len(lines) == pytest.approx(130, abs=6)
@@ -55,29 +54,29 @@ def test_lines_continue_through_a_gap_as_they_would_live(tmp_path: Path, stdout:
     assert first_lost["stamp"].startswith("2027-01-15T08:00:05.5")
 
 
-def test_a_jump_of_the_clock_begins_anew_without_lines_in_between(tmp_path: Path, stdout: TextIO) -> None:
+def test_a_clock_jump_starts_a_new_segment_without_lines_in_between(tmp_path: Path, stdout: TextIO) -> None:
     lines = replayed(log_of(tmp_path / "a.tlog", 0, 1, 90_000, 90_001), stdout)
     assert 15 < len(lines) < 30
     assert {line["link"]["state"] for line in lines} == {"CONNECTED"}
     assert [line["seq"] for line in lines] == list(range(len(lines)))
 
 
-def test_the_new_segment_knows_nothing_of_the_old_one(tmp_path: Path, stdout: TextIO) -> None:
-    plant = plant_of(stdout)
+def test_a_new_segment_keeps_no_state_of_the_previous_one(tmp_path: Path, stdout: TextIO) -> None:
+    pipeline = pipeline_of(stdout)
     since = []
 
     def watched() -> Iterator[Stamped]:
         for stamped in Recording(log_of(tmp_path / "a.tlog", 0, 1, 90_000, 90_001)):
             yield stamped
-            (tracked,) = plant.hw.vehicles
+            (tracked,) = pipeline.vehicles.vehicles
             if stamped[1] is not None:
                 since.append({(inhibit.since_us - START_US) / 1e6 for inhibit in tracked.handle.detail.inhibits})
 
-    run_through(plant, watched())
+    run_through(pipeline, watched())
     assert since == [{0.0}, {0.0}, {90_000.0}, {90_000.0}]
 
 
-def test_lines_continue_to_the_last_frame_even_if_nobody_wants_it(tmp_path: Path, stdout: TextIO) -> None:
+def test_lines_continue_to_the_last_frame_even_if_it_is_ignored(tmp_path: Path, stdout: TextIO) -> None:
     unwanted = encode(MessageInterval(0, 0), system=1, component=1, sequence=2)
     assert 244 not in WANTED_IDS
     path = Path(log_of(tmp_path / "a.tlog", 0, 1))
@@ -88,28 +87,26 @@ def test_lines_continue_to_the_last_frame_even_if_nobody_wants_it(tmp_path: Path
     assert len(lines) == pytest.approx(61, abs=3)
 
 
-def test_an_instant_is_lived_before_the_next_is_asked_for(tmp_path: Path, stdout: TextIO) -> None:
-    plant = plant_of(stdout)
+def test_each_instant_is_processed_before_the_next_is_read(tmp_path: Path, stdout: TextIO) -> None:
+    pipeline = pipeline_of(stdout)
     told = []
 
     def watched() -> Iterator[Stamped]:
         for stamped in Recording(log_of(tmp_path / "a.tlog", 0, 10)):
             yield stamped
-            (tracked,) = plant.hw.vehicles
+            (tracked,) = pipeline.vehicles.vehicles
             link = tracked.handle.detail.link.value
             told.append((stamped[0].mono, stamped[1] is None, link, tracked.handle.heard_at))
 
-    last = run_through(plant, watched())
+    last = run_through(pipeline, watched())
     assert told == [(0.0, False, "CONNECTED", 0.0), (10.0, False, "CONNECTED", 10.0), (10.0, True, "CONNECTED", 10.0)]
     assert last.mono == 10.0
-    plant.close(last)
+    pipeline.close(last)
     stdout.seek(0)
     assert any(json.loads(line)["link"]["state"] == "LOST" for line in stdout)
 
 
-def test_a_vehicle_that_is_expected_has_lines_from_the_start_and_also_if_it_is_never_heard(
-    tmp_path: Path, stdout: TextIO
-) -> None:
+def test_an_expected_vehicle_has_lines_from_the_start_even_if_it_never_appears(tmp_path: Path, stdout: TextIO) -> None:
     config = Config(vehicles=(VehicleConfig(7, None, "seven"),))
     replay(config, log_of(tmp_path / "a.tlog", 0, 1, 2), stdout)
     stdout.seek(0)
@@ -118,6 +115,6 @@ def test_a_vehicle_that_is_expected_has_lines_from_the_start_and_also_if_it_is_n
     assert len(lines) == pytest.approx(20, abs=2)
 
 
-def test_a_missing_log_is_an_error_for_the_person(tmp_path: Path, stdout: TextIO) -> None:
+def test_a_missing_log_is_a_user_error(tmp_path: Path, stdout: TextIO) -> None:
     with pytest.raises(UsageError, match="cannot read the log"):
         replay(Config(), str(tmp_path / "missing.tlog"), stdout)

@@ -1,4 +1,4 @@
-"""Who gets which frame: MAVLink's routing guide as a table, then whatever anybody may send."""
+"""Routing of frames: the MAVLink routing guide as a table, then arbitrary traffic."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def router() -> Router[End]:
 
 
 GUIDE = [
-    # what, came from, sender, message, goes to
+    # case, source channel, sender, message, destinations
     ("no target: from a vehicle to all outs and the rest of it", VEHICLE, (1, 1), ATTITUDE, (CAMERA, *ALL[4:])),
     ("no target: from a ground station to all", GROUND, (255, 190), ATTITUDE, (VEHICLE, CAMERA, OTHER, TABLET, NOBODY)),
     ("target 0: to all", GROUND, (255, 190), command(0, 0), (VEHICLE, CAMERA, OTHER, TABLET, NOBODY)),
@@ -105,13 +105,13 @@ def test_the_routing_guide(came_from: End, sender: tuple[int, int], message: Nam
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_both_versions_go_the_same_way(version: int) -> None:
+def test_mavlink_1_and_mavlink_2_are_routed_alike(version: int) -> None:
     request = RequestDataStream(4, 2, 1, 0, 1)
     assert router().destinations(frame_of(request, 255, 190, version=version), GROUND, ALL, 1.0) == (OTHER,)
 
 
-def test_a_target_that_was_cut_off_is_zero() -> None:
-    """COMMAND_ACK of MAVLink 1 times has no target; of MAVLink 2, trailing zeros are not sent."""
+def test_a_truncated_target_field_is_zero() -> None:
+    """A MAVLink 1 COMMAND_ACK has no target. MAVLink 2 omits trailing zeros."""
     payload = frame_of(CommandAck(400, 0, 0, 0, 255, 190)).payload
 
     def cut_to(length: int) -> Frame:
@@ -124,12 +124,12 @@ def test_a_target_that_was_cut_off_is_zero() -> None:
     assert router().destinations(cut_to(9), VEHICLE, ALL, 1.0) == (GROUND,)
 
 
-def test_a_message_that_names_only_a_system_is_for_the_whole_of_it() -> None:
-    set_mode = frame_of(SetMode(0, 1, 100), 255, 190)  # its last byte is no component
+def test_a_message_with_only_a_target_system_goes_to_all_its_components() -> None:
+    set_mode = frame_of(SetMode(0, 1, 100), 255, 190)  # its last byte is not a component
     assert router().destinations(set_mode, GROUND, ALL, 1.0) == (VEHICLE, CAMERA)
 
 
-def test_component_0_is_the_whole_system_even_if_somebody_speaks_as_it() -> None:
+def test_target_component_0_means_the_whole_system_even_if_a_sender_uses_0() -> None:
     some = router()
     some.destinations(frame_of(ATTITUDE, 255, 0), TABLET, ALL, 1.0)
     assert some.destinations(frame_of(command(255, 0)), VEHICLE, ALL, 1.0) == (GROUND, TABLET)
@@ -142,33 +142,33 @@ def test_component_0_is_the_whole_system_even_if_somebody_speaks_as_it() -> None
     )
 
 
-def test_an_unknown_message_goes_to_all_and_teaches_nothing() -> None:
+def test_an_unknown_message_is_broadcast_and_adds_no_route() -> None:
     some = router()
     assert some.destinations(unknown_frame(77, 7), GROUND, ALL, 1.0) == (VEHICLE, CAMERA, OTHER, TABLET, NOBODY)
     assert some.destinations(frame_of(command(77, 7)), VEHICLE, ALL, 1.0) == ()
 
 
-def test_a_sender_is_learned_from_what_it_sends_even_after_unknown_messages() -> None:
+def test_a_known_message_adds_a_route_even_after_unknown_messages() -> None:
     some = router()
     some.destinations(unknown_frame(77, 7), TABLET, ALL, 1.0)
     some.destinations(frame_of(ATTITUDE, 77, 7), TABLET, ALL, 1.0)
     assert some.destinations(frame_of(command(77, 7)), VEHICLE, ALL, 1.0) == (TABLET,)
 
 
-def test_a_sender_that_moves_is_found_at_its_new_place_at_once() -> None:
+def test_a_sender_that_moves_is_routed_to_its_new_channel_at_once() -> None:
     some = router()
     assert some.destinations(frame_of(command(1, 1), 255, 190), GROUND, ALL, 1.0) == (VEHICLE,)
     some.destinations(frame_of(ATTITUDE), OTHER, ALL, 1.0)
     assert some.destinations(frame_of(command(1, 1), 255, 190, 1), GROUND, ALL, 1.0) == (VEHICLE, OTHER)
 
 
-def test_who_claims_the_broadcast_system_is_not_learned() -> None:
+def test_a_sender_with_the_broadcast_system_id_adds_no_route() -> None:
     some = router()
     some.destinations(frame_of(ATTITUDE, 0, 5), GROUND, ALL, 1.0)
     assert some.destinations(frame_of(ATTITUDE, 0, 5, 1), TABLET, ALL, 1.0) == (VEHICLE, CAMERA, OTHER, GROUND, NOBODY)
 
 
-def test_channels_come_and_go() -> None:
+def test_channels_can_be_added_and_removed() -> None:
     some = router()
     late = End("late", is_out=True)
     assert some.destinations(frame_of(ATTITUDE, sequence=1), VEHICLE, (VEHICLE, GROUND), 1.0) == (GROUND,)
@@ -176,7 +176,7 @@ def test_channels_come_and_go() -> None:
     assert some.destinations(frame_of(ATTITUDE, sequence=3), VEHICLE, (VEHICLE, late), 1.0) == (late,)
 
 
-def test_what_comes_back_from_ourselves_goes_nowhere_and_is_not_learned() -> None:
+def test_our_own_frames_are_dropped_and_add_no_route() -> None:
     some = router()
     assert some.destinations(frame_of(command(1, 192), 255, 190, 2), TABLET, ALL, 1.0) == (VEHICLE, CAMERA)
     some.speak_as({(1, 192)})
@@ -187,7 +187,7 @@ def test_what_comes_back_from_ourselves_goes_nowhere_and_is_not_learned() -> Non
     assert some.destinations(frame_of(command(1, 192), 255, 190, 1), TABLET, ALL, 1.0) == (CAMERA,)
 
 
-def test_a_copy_on_another_channel_is_dropped_and_teaches_nothing() -> None:
+def test_a_copy_on_another_channel_is_dropped_and_adds_no_route() -> None:
     some = router()
     frame = frame_of(ATTITUDE, 5, 1)
     assert VEHICLE in some.destinations(frame, GROUND, ALL, 1.0)
@@ -195,20 +195,20 @@ def test_a_copy_on_another_channel_is_dropped_and_teaches_nothing() -> None:
     assert some.destinations(frame_of(command(5, 1)), VEHICLE, ALL, 1.1) == (GROUND,)
 
 
-def test_a_repeat_on_the_same_channel_is_passed_on() -> None:
+def test_a_repeat_on_the_same_channel_is_forwarded() -> None:
     some = router()
     for i in range(50):
         assert some.destinations(frame_of(ATTITUDE), VEHICLE, ALL, 1.0 + i / 10) == (CAMERA, GROUND, TABLET, NOBODY)
     assert some.destinations(frame_of(ATTITUDE), GROUND, ALL, 1.0 + 50 / 10) == ()
 
 
-def test_the_same_bytes_much_later_are_no_copy() -> None:
+def test_the_same_bytes_much_later_are_not_a_copy() -> None:
     some = router()
     some.destinations(frame_of(ATTITUDE, 5, 1), GROUND, ALL, 1.0)
     assert some.destinations(frame_of(ATTITUDE, 5, 1), TABLET, ALL, 1.0 + 2 * WINDOW) != ()
 
 
-def test_many_frames_at_once_only_shorten_the_memory() -> None:
+def test_a_burst_of_frames_only_shortens_the_duplicate_window() -> None:
     some = router()
     first = frame_of(ATTITUDE, 5, 1)
     some.destinations(first, GROUND, ALL, 1.0)
@@ -217,13 +217,13 @@ def test_many_frames_at_once_only_shorten_the_memory() -> None:
     assert some.destinations(first, TABLET, ALL, 1.0) != ()
 
 
-def test_a_ring_comes_to_rest() -> None:
-    """Two of our links end in one hub that repeats everything to everybody but its sender."""
+def test_a_routing_loop_ends() -> None:
+    """Two links end in one hub that repeats each frame to all ports except its source."""
     left, right = End("left", is_out=True), End("right", is_out=True)
     ends = (left, right)
     some: Router[End] = Router()
     frame = frame_of(ATTITUDE, 5, 1)
-    arriving, sent = [left, right], 0  # as the hub hands the frame out
+    arriving, sent = [left, right], 0  # as the hub delivers the frame
     while arriving and sent < 100:
         to = some.destinations(frame, arriving.pop(0), ends, 1.0)
         sent += len(to)
@@ -231,7 +231,7 @@ def test_a_ring_comes_to_rest() -> None:
     assert sent == 1
 
 
-def test_who_is_silent_for_long_is_forgotten_who_speaks_is_not() -> None:
+def test_silent_senders_are_forgotten_and_active_ones_are_not() -> None:
     some = router()
     for second in range(1, int(SILENCE) + 10):
         some.destinations(frame_of(ATTITUDE, 1, 1, second % 256), VEHICLE, ALL, float(second))
@@ -240,7 +240,7 @@ def test_who_is_silent_for_long_is_forgotten_who_speaks_is_not() -> None:
     assert some.destinations(frame_of(command(2, 1), 255, 190), GROUND, ALL, now) == ()
 
 
-def test_the_table_is_bounded_and_the_longest_silent_goes_first() -> None:
+def test_the_routing_table_is_bounded_and_drops_the_longest_silent_sender_first() -> None:
     some = router()
     for i in range(20 * MOST_ROUTES):
         some.heard(NOBODY, 10 + i // 250, i % 250, 1.0)
@@ -259,7 +259,7 @@ def datagram(*frames: Frame) -> bytes:
 BEAT = Heartbeat(0, 2, 3, 0, 4, 3)
 
 
-def test_a_datagram_of_one_way_is_sent_as_it_came() -> None:
+def test_a_datagram_for_one_route_is_forwarded_unchanged() -> None:
     one, two = frame_of(BEAT), frame_of(ATTITUDE, sequence=1)
     data = datagram(one, two)
     ((sent, to),) = router().plan(data, [one, two], VEHICLE, ALL, 1.0)
@@ -267,26 +267,26 @@ def test_a_datagram_of_one_way_is_sent_as_it_came() -> None:
     assert to == (CAMERA, GROUND, TABLET, NOBODY)
 
 
-def test_a_datagram_of_several_ways_is_sent_frame_by_frame() -> None:
+def test_a_datagram_for_several_routes_is_forwarded_frame_by_frame() -> None:
     one, two, three = frame_of(BEAT), frame_of(command(255, 190), sequence=1), frame_of(command(9, 9), sequence=2)
     plan = router().plan(datagram(one, two, three), [one, two, three], VEHICLE, ALL, 1.0)
     assert plan == [(one.raw, (CAMERA, GROUND, TABLET, NOBODY)), (two.raw, (GROUND,))]
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_garbage_is_not_passed_on(count: int) -> None:
+def test_garbage_is_not_forwarded(count: int) -> None:
     frames = [frame_of(BEAT), frame_of(ATTITUDE, sequence=1)][:count]
     for data in (b"xy" + datagram(*frames), b"y".join(f.raw for f in frames) + b"x", datagram(*frames) + b"\xfd\x09"):
         got = Parser(None).feed(data)
         assert [sent for sent, _ in router().plan(data, got, VEHICLE, ALL, 1.0)] == [f.raw for f in frames]
 
 
-def test_frames_of_a_stream_go_one_by_one() -> None:
+def test_frames_of_a_stream_are_forwarded_one_by_one() -> None:
     one, two = frame_of(BEAT), frame_of(ATTITUDE, sequence=1)
     assert [sent for sent, _ in router().plan(b"", [one, two], VEHICLE, ALL, 1.0)] == [one.raw, two.raw]
 
 
-def test_nothing_is_planned_for_what_goes_nowhere() -> None:
+def test_a_frame_without_a_destination_has_no_plan() -> None:
     one, two = frame_of(command(9, 9)), frame_of(command(9, 9), sequence=1)
     assert router().plan(b"", [], VEHICLE, ALL, 1.0) == []
     assert router().plan(one.raw, [one], VEHICLE, ALL, 1.0) == []
@@ -310,7 +310,7 @@ STEPS = st.lists(
 
 
 @given(STEPS, st.sets(ENDS))
-def test_whatever_comes_the_promises_hold(
+def test_the_routing_invariants_hold_for_any_traffic(
     steps: list[tuple[End, int, int, CommandLong | Attitude | None, int, float]], absent: set[End]
 ) -> None:
     some: Router[End] = Router()
@@ -345,7 +345,7 @@ BYTES = st.lists(st.one_of(FRAMES, COMMANDS, UNKNOWN, st.binary(max_size=30)), m
 
 
 @given(st.lists(st.tuples(ENDS, BYTES, st.booleans()), max_size=10))
-def test_no_bytes_raise_and_none_are_invented(pieces: list[tuple[End, bytes, bool]]) -> None:
+def test_any_bytes_are_accepted_and_no_bytes_are_added(pieces: list[tuple[End, bytes, bool]]) -> None:
     some = router()
     parsers = {end: Parser(None) for end in ALL}
     for end, data, stream in pieces:

@@ -1,4 +1,4 @@
-"""A third party's controllers and publisher, as the tests of the gateway load them."""
+"""Third-party controllers and publishers for the gateway tests."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ImpossibleController(IndustrialRobotStatusController):
 
 
 class Collecting:
-    """Keeps its messages; an option makes it fail at the first."""
+    """Stores its messages. An option makes it fail at the first one."""
 
     periodic = True
 
@@ -49,11 +49,35 @@ class Collecting:
         self.closed = True
 
 
+class LiveOnly(Collecting):
+    """A third-party publisher that a replay skips."""
+
+    live_only = True
+
+
+class Durable(Collecting):
+    """A durable third-party publisher."""
+
+    durable = True
+
+    def publish(self, msg: RobotStatusMsg) -> None:
+        super().publish(msg)
+        ORDER.append("durable")
+
+
+class Shown(Collecting):
+    def publish(self, msg: RobotStatusMsg) -> None:
+        super().publish(msg)
+        ORDER.append("shown")
+
+
 MADE: list[Collecting] = []
+ORDER: list[str] = []
+"""The types of the publishers above, in the order of their messages."""
 
 
 class Point:
-    """What is needed of an importlib.metadata.EntryPoint."""
+    """The part of importlib.metadata.EntryPoint that the tests need."""
 
     def __init__(self, name: str, loaded: Any) -> None:
         self.name, self._loaded = name, loaded
@@ -71,13 +95,19 @@ POINTS = {
         Point("third_party/Impossible", ImpossibleController),
         Point("third_party/Absent", ImportError("no module named numpy")),
     ],
-    plugins.PUBLISHERS: [Point("collecting", Collecting)],
+    plugins.PUBLISHERS: [
+        Point("collecting", Collecting),
+        Point("live only", LiveOnly),
+        Point("durable", Durable),
+        Point("shown", Shown),
+    ],
 }
 
 
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch) -> list[Collecting]:
-    """As if a third party's distribution were installed; the publishers that are made."""
+    """Simulate an installed third-party distribution. Returns the created publishers."""
     monkeypatch.setattr("importlib.metadata.entry_points", lambda group: POINTS[group])
     MADE.clear()
+    ORDER.clear()
     return MADE

@@ -1,15 +1,15 @@
-"""Handles: a name and the latest status under it."""
+"""Handles: a name and its latest status."""
 
 from __future__ import annotations
 
 from mav_robot_status.interface import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle, RobotStatus, TriState
 
 
-def test_the_default_name_is_the_one_that_ros_control_users_know() -> None:
+def test_the_default_name_is_that_of_the_ros_control_handle() -> None:
     assert DEFAULT_HANDLE_NAME == "industrial_robot_status_handle"
 
 
-def test_a_new_handle_knows_nothing() -> None:
+def test_a_new_handle_is_unknown() -> None:
     handle = IndustrialRobotStatusHandle("arm")
     assert handle.name == "arm"
     assert handle.status == RobotStatus()
@@ -35,7 +35,7 @@ def test_two_handles_share_nothing() -> None:
     assert other.status == RobotStatus()
 
 
-def test_the_representation_tells_the_name_and_the_status() -> None:
+def test_the_repr_shows_the_name_and_the_status() -> None:
     text = repr(IndustrialRobotStatusHandle("arm", RobotStatus(error_code=7)))
     assert "'arm'" in text
     assert "error_code=7" in text

@@ -1,4 +1,4 @@
-"""Where handles and interfaces are registered and found."""
+"""Registration and lookup of handles and interfaces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from mav_robot_status.interface import (
     IndustrialRobotStatusHandle,
     IndustrialRobotStatusInterface,
     InterfaceManager,
-    RobotHW,
 )
 
 
@@ -32,7 +31,7 @@ def test_names_are_listed_in_the_order_of_registration(interface: IndustrialRobo
     assert interface.get_names() == ["rover", "copter", "arm"]
 
 
-def test_an_unknown_handle_is_an_error_that_lists_the_names_there_are(
+def test_an_unknown_handle_is_an_error_that_lists_the_registered_names(
     interface: IndustrialRobotStatusInterface,
 ) -> None:
     interface.register_handle(IndustrialRobotStatusHandle("rover"))
@@ -43,7 +42,7 @@ def test_an_unknown_handle_is_an_error_that_lists_the_names_there_are(
     assert caught.value.exit_code == 2
 
 
-def test_the_error_says_so_if_no_handle_is_registered_at_all(interface: IndustrialRobotStatusInterface) -> None:
+def test_the_error_says_if_no_handle_is_registered(interface: IndustrialRobotStatusInterface) -> None:
     with pytest.raises(UnknownHandleError, match=r"registered: none$"):
         interface.get_handle("rover")
 
@@ -68,18 +67,18 @@ def test_an_interface_is_found_by_its_type(interface: IndustrialRobotStatusInter
     assert manager.get(IndustrialRobotStatusInterface) is interface
 
 
-def test_an_interface_that_the_hardware_does_not_offer_is_an_error_that_names_it() -> None:
+def test_an_interface_missing_from_the_hardware_is_an_error_that_names_it() -> None:
     with pytest.raises(MavRobotStatusError, match=r"^this hardware offers no IndustrialRobotStatusInterface$"):
-        RobotHW().get(IndustrialRobotStatusInterface)
+        InterfaceManager().get(IndustrialRobotStatusInterface)
 
 
 def test_a_hardware_interface_may_offer_interfaces_of_several_types(
     interface: IndustrialRobotStatusInterface,
 ) -> None:
     class LampInterface:
-        """Another kind."""
+        """Another interface type."""
 
-    hardware, lamps = RobotHW(), LampInterface()
+    hardware, lamps = InterfaceManager(), LampInterface()
     hardware.register_interface(interface)
     hardware.register_interface(lamps)
     assert hardware.get(IndustrialRobotStatusInterface) is interface

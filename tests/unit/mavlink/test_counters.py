@@ -7,7 +7,7 @@ def test_counters_add_up() -> None:
     assert total == Counters(11, 22, 33, 44, 55, 66, {7: 88, 8: 1}, {9: 10})
 
 
-def test_a_full_table_counts_what_is_new_under_one_key_and_what_it_has_as_before() -> None:
+def test_a_full_table_counts_new_ids_under_one_key_and_known_ids_as_before() -> None:
     table = dict.fromkeys(range(MAX_IDS), 1)
     for message_id in (MAX_IDS, 5, MAX_IDS + 1):
         count(table, message_id)

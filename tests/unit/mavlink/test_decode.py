@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from mav_robot_status.mavlink import pymavlink_dialect
 from mav_robot_status.mavlink.decode import text
 from mav_robot_status.mavlink.definitions import MESSAGES, Definition
 from mav_robot_status.mavlink.encode import enclose
 from mav_robot_status.mavlink.framing import Parser
+from tests import pymavlink_dialect
 
 CODES = {"uint8_t": "B", "uint16_t": "H", "int32_t": "i", "float": "f"}
 
 
 def raw(message: Any, name: str, size: int) -> bytes:
-    """An array of a pymavlink message as the bytes it had on the wire."""
+    """An array of a pymavlink message as bytes on the wire."""
     value = getattr(message, f"_{name}_raw", getattr(message, name))
     if isinstance(value, list):
         kind = message.fieldtypes[message.fieldnames.index(name)]
@@ -60,7 +60,7 @@ def test_a_short_mavlink_1_payload_without_extensions_is_filled_up() -> None:
     assert decoded(77, b"\x90\x01\x04", version=1) == MESSAGES[77].type(400, 4, 0, 0, 0, 0)
 
 
-def test_a_message_that_is_not_used_is_none() -> None:
+def test_an_unused_message_decodes_to_none() -> None:
     assert decoded(46, bytes(2)) is None
 
 

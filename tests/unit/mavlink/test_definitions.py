@@ -1,4 +1,4 @@
-"""The generated files are what dialects/generate.py makes, and our XML is one that others can generate from."""
+"""The generated files are the output of dialects/generate.py, and other generators accept our XML."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ PYMAVLINK = importlib.metadata.version("pymavlink")
 PIN = re.search(r'"pymavlink==([\d.]+)"', (ROOT / "pyproject.toml").read_text())
 
 
-def test_the_generated_files_are_what_the_generator_makes(tmp_path: pathlib.Path) -> None:
+def test_the_files_are_the_output_of_the_generator(tmp_path: pathlib.Path) -> None:
     assert PIN, "pyproject.toml pins pymavlink in the dev extra"
     if PIN[1] != PYMAVLINK:
         pytest.skip(f"the files are generated with pymavlink {PIN[1]}, here is {PYMAVLINK}")
     subprocess.run([sys.executable, ROOT / "dialects" / "generate.py", tmp_path], check=True, timeout=120)
-    for name in ("definitions.py", "pymavlink_dialect.py"):
-        committed = (ROOT / "mav_robot_status" / "mavlink" / name).read_bytes()
+    for name in ("mavlink/definitions.py", "mavlink/enumerations.py", "testing/definitions.py"):
+        committed = (ROOT / "mav_robot_status" / name).read_bytes()
         assert (tmp_path / name).read_bytes() == committed, f"{name} differs: run dialects/generate.py"
 
 
@@ -40,7 +40,7 @@ def test_every_message_we_use_can_be_checked() -> None:
 
 @pytest.fixture(scope="module")
 def full_dialect(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """What a user gets who generates from our XML beside the public files."""
+    """A dialect that a user generates from our XML and the public files."""
     folder = tmp_path_factory.mktemp("dialect")
     public = pathlib.Path(dialects.__file__ or "").parent / "v20"
     for name in ("common", "standard", "minimal"):
@@ -57,7 +57,7 @@ def full_dialect(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     return module
 
 
-def test_our_xml_generates_beside_the_public_files(full_dialect: ModuleType) -> None:
+def test_a_dialect_can_be_generated_from_our_xml_and_the_public_files(full_dialect: ModuleType) -> None:
     assert full_dialect.mavlink_map[59900].crc_extra == CRC_EXTRA[59900]
     assert full_dialect.mavlink_map[0].msgname == "HEARTBEAT"
 

@@ -1,4 +1,4 @@
-"""Frames as pymavlink writes them; the golden frames serve encoder, parser and decoder alike."""
+"""The frames equal those of pymavlink. The golden frames test the encoder, the parser and the decoder."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from mav_robot_status.mavlink import pymavlink_dialect
 from mav_robot_status.mavlink.definitions import (
     MESSAGES,
     AvailableModesMonitor,
@@ -20,6 +19,7 @@ from mav_robot_status.mavlink.definitions import (
 )
 from mav_robot_status.mavlink.encode import Encoder, encode
 from mav_robot_status.mavlink.framing import Parser
+from tests import pymavlink_dialect
 
 GOLDEN = [
     # message, (system, component, sequence, version), frame as packed by pymavlink 2.4.50
@@ -46,7 +46,7 @@ EVERY_MESSAGE = pytest.mark.parametrize("definition", MESSAGES.values(), ids=lam
 
 
 @pytest.mark.parametrize(("message", "header", "wire"), GOLDEN, ids=lambda v: type(v).__name__)
-def test_golden_frames_are_written_and_read(message: Any, header: tuple[int, int, int, int], wire: str) -> None:
+def test_golden_frames_are_encoded_and_parsed(message: Any, header: tuple[int, int, int, int], wire: str) -> None:
     system, component, sequence, version = header
     data = bytes.fromhex(wire)
     assert encode(message, system=system, component=component, sequence=sequence, version=version) == data
@@ -71,7 +71,7 @@ def test_pymavlink_writes_the_same_bytes(definition: Definition) -> None:
             assert theirs.pack(mav, force_mavlink1=version == 1) == frame
 
 
-def test_trailing_zeros_are_cut_off_but_one_byte_stays() -> None:
+def test_trailing_zeros_are_removed_but_one_byte_stays() -> None:
     assert encode(AvailableModesMonitor(0), system=1, component=1, sequence=0)[1] == 1
     assert encode(ExtendedSysState(0, 0), system=1, component=1, sequence=0)[1] == 1
     assert encode(ExtendedSysState(5, 0), system=1, component=1, sequence=0)[1] == 1
@@ -101,12 +101,12 @@ class NoMessage(NamedTuple):
         (ExtendedSysState(0, 0), {"sequence": -1}, "sequence -1"),
     ],
 )
-def test_a_programmers_mistake_is_a_value_error(message: Any, options: dict[str, int], what: str) -> None:
+def test_an_invalid_argument_is_a_value_error(message: Any, options: dict[str, int], what: str) -> None:
     with pytest.raises(ValueError, match=what):
         encode(message, **{"system": 1, "component": 1, "sequence": 0, **options})
 
 
-def test_a_mistake_uses_up_no_sequence_number() -> None:
+def test_a_failed_encode_uses_no_sequence_number() -> None:
     encoder = Encoder(1, 1)
     with pytest.raises(ValueError):
         encoder.frame(ExtendedSysState(-1, 0))

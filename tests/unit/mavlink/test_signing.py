@@ -1,4 +1,4 @@
-"""Signatures made and verified, with pymavlink as the second opinion in both directions."""
+"""Signing and verifying. Compares with pymavlink in both directions."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mav_robot_status.mavlink import pymavlink_dialect
 from mav_robot_status.mavlink.definitions import CRC_EXTRA, MESSAGES, Heartbeat, Statustext
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.framing import Frame, Parser
 from mav_robot_status.mavlink.signing import (
     EPOCH_US,
+    MAX_BEHIND,
     MAX_STAMP,
     MAX_STREAMS,
-    MOST_BEHIND,
     UNSIGNED_IDS,
     WORDS,
     Signer,
@@ -25,6 +24,7 @@ from mav_robot_status.mavlink.signing import (
     is_signed,
     stamp_at,
 )
+from tests import pymavlink_dialect
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
 NOW = 1_795_200_547_123_456  # us since 1970: 2026
@@ -42,7 +42,7 @@ def radio_status(message_id: int = 109) -> Frame:
 
 
 def signed(stamp: int, key: bytes = KEY, link_id: int = 0, system: int = 1, component: int = 1) -> bytes:
-    """A peer's frame with this very stamp."""
+    """A peer's frame with this stamp."""
     return Signer(key, link_id, stamp - 1).sign(unsigned(system=system, component=component), 0)
 
 
@@ -64,7 +64,7 @@ def found(by: Verifier) -> dict[Verdict, int]:
 
 
 class Pymavlink:
-    """The other side."""
+    """pymavlink as the peer."""
 
     def __init__(self, key: bytes = KEY, stamp: int = STAMP, link_id: int = 3) -> None:
         self.mav: Any = pymavlink_dialect.MAVLink(None, 1, 1)
@@ -79,7 +79,7 @@ class Pymavlink:
         return packed
 
     def accepts(self, data: bytes) -> bool:
-        """Whether they take it. Raises MAVError where they say why not."""
+        """Whether pymavlink accepts the frame. Raises MAVError with the reason if it has one."""
         return self.mav.parse_char(data) is not None
 
 
@@ -98,7 +98,7 @@ def test_pymavlink_accepts_every_message_that_we_sign() -> None:
         assert peer.accepts(signer.sign(frame, NOW))
 
 
-def test_pymavlink_refuses_what_we_sign_with_another_key() -> None:
+def test_pymavlink_refuses_our_signature_with_another_key() -> None:
     with pytest.raises(pymavlink_dialect.MAVError, match="Invalid signature"):
         Pymavlink().accepts(Signer(OTHER_KEY, 192).sign(unsigned(), NOW))
 
@@ -113,7 +113,7 @@ def test_a_stamp_counts_10_us_from_2015() -> None:
     assert int.from_bytes(frame[-12:-6], "little") == (NOW - EPOCH_US) // 10
 
 
-def test_every_frame_has_a_later_stamp_though_the_clock_stands_or_steps_back() -> None:
+def test_every_frame_has_a_later_stamp_even_if_the_clock_stops_or_steps_back() -> None:
     signer = Signer(KEY, 192, stamp=5)
     stamps = []
     for at in (NOW, NOW, NOW - 3_600_000_000, 0, -1, NOW + 20):
@@ -122,7 +122,7 @@ def test_every_frame_has_a_later_stamp_though_the_clock_stands_or_steps_back() -
     assert signer.stamp == stamps[-1]
 
 
-def test_what_comes_late_over_a_slow_link_is_no_replay() -> None:
+def test_a_frame_that_is_late_on_a_slow_link_is_not_a_replay() -> None:
     signer, peer = Signer(KEY, 255), Pymavlink()
     slow, fast = (signer.sign(unsigned(component=192), NOW, link) for link in (0, 1))
     assert (slow[-13], fast[-13]) == (255, 0)
@@ -130,12 +130,12 @@ def test_what_comes_late_over_a_slow_link_is_no_replay() -> None:
     assert peer.accepts(slow)
 
 
-def test_a_stamp_that_was_kept_is_not_used_again() -> None:
+def test_a_stored_stamp_is_not_used_again() -> None:
     frame = Signer(KEY, 192, stamp=STAMP + 100).sign(unsigned(), NOW)
     assert int.from_bytes(frame[-12:-6], "little") == STAMP + 101
 
 
-def test_at_the_end_of_all_stamps_signing_goes_on_with_the_last() -> None:
+def test_at_the_last_stamp_signing_continues_with_it() -> None:
     signer = Signer(KEY, 192, stamp=MAX_STAMP)
     assert signer.sign(unsigned(), NOW)[-12:-6] == b"\xff" * 6
 
@@ -154,7 +154,7 @@ def test_a_frame_of_an_unknown_id_cannot_be_signed() -> None:
         Signer(KEY, 192).sign(bytes([0xFD, 1, 0, 0, 0, 1, 1, 1, 0, 0x7A, 5, 0, 0]), NOW)
 
 
-def test_a_key_of_another_size_is_a_mistake() -> None:
+def test_a_key_of_another_size_is_a_value_error() -> None:
     with pytest.raises(ValueError, match="32 bytes, not 5"):
         Signer(b"short", 0)
 
@@ -171,7 +171,7 @@ def test_frames_of_pymavlink_are_verified() -> None:
     assert found(ours) == {Verdict.VERIFIED: 300}
 
 
-def test_what_we_sign_we_verify() -> None:
+def test_our_verifier_accepts_our_signatures() -> None:
     assert judged(verifier(), Signer(KEY, 192).sign(unsigned(), NOW)) is Verdict.VERIFIED
 
 
@@ -182,7 +182,7 @@ def test_a_signed_frame_of_an_unknown_id_is_verified_too() -> None:
     assert verifier().judge(frame, NOW) is Verdict.VERIFIED
 
 
-def test_a_frame_replayed_is_refused() -> None:
+def test_a_replayed_frame_is_refused() -> None:
     ours = verifier()
     first, second = signed(STAMP), signed(STAMP + 1)
     assert [judged(ours, data) for data in (first, first, second, first, second)] == [
@@ -211,7 +211,7 @@ def test_every_flipped_bit_is_noticed() -> None:
     for bit in range(len(data) * 8):
         flipped = bytearray(data)
         flipped[bit // 8] ^= 1 << bit % 8
-        expected = Verdict.UNSIGNED if bit == 16 else Verdict.FORGED  # the flag that says that there is a signature
+        expected = Verdict.UNSIGNED if bit == 16 else Verdict.FORGED  # the flag of a signed frame
         assert ours.judge(template._replace(raw=bytes(flipped)), NOW) is expected
     assert ours.judge(template, NOW) is Verdict.VERIFIED
 
@@ -229,7 +229,7 @@ def test_another_key_is_refused() -> None:
     assert found(ours) == {Verdict.FORGED: 1}
 
 
-def test_a_forged_stamp_of_the_far_future_does_not_lock_the_real_peer_out() -> None:
+def test_a_forged_stamp_in_the_far_future_does_not_lock_out_the_real_peer() -> None:
     signer = Signer(KEY, 192)
     ours = Verifier(signer)
     for peer_is_known in (False, True):
@@ -241,22 +241,22 @@ def test_a_forged_stamp_of_the_far_future_does_not_lock_the_real_peer_out() -> N
 
 
 def test_a_new_stream_may_be_a_minute_behind_and_no_more() -> None:
-    assert judged(verifier(), signed(STAMP - MOST_BEHIND)) is Verdict.VERIFIED
-    assert judged(verifier(), signed(STAMP - MOST_BEHIND - 1)) is Verdict.STALE
+    assert judged(verifier(), signed(STAMP - MAX_BEHIND)) is Verdict.VERIFIED
+    assert judged(verifier(), signed(STAMP - MAX_BEHIND - 1)) is Verdict.STALE
 
 
-def test_a_new_stream_is_measured_by_our_time_stamp_where_that_is_ahead_of_the_clock() -> None:
-    assert judged(verifier(STAMP + 1), signed(STAMP - MOST_BEHIND)) is Verdict.STALE
+def test_a_new_stream_is_compared_with_our_stamp_if_that_is_ahead_of_the_clock() -> None:
+    assert judged(verifier(STAMP + 1), signed(STAMP - MAX_BEHIND)) is Verdict.STALE
 
 
-def test_a_known_stream_may_fall_behind() -> None:
-    """An autopilot without the time of day adds one for each frame, and no more."""
+def test_a_known_stream_may_be_far_behind_our_stamp() -> None:
+    """An autopilot without the time of day adds one unit for each frame."""
     ours = verifier()
     assert judged(ours, signed(STAMP)) is Verdict.VERIFIED
     assert judged(ours, signed(STAMP + 1), NOW + 60 * MINUTE) is Verdict.VERIFIED
 
 
-def test_an_autopilot_without_the_time_of_day_is_verified_once_it_has_heard_us() -> None:
+def test_an_autopilot_without_the_time_is_verified_after_it_has_received_our_frame() -> None:
     peer, signer = Pymavlink(stamp=1000), Signer(KEY, 192)
     ours = Verifier(signer)
     assert judged(ours, peer.pack()) is Verdict.STALE
@@ -264,19 +264,19 @@ def test_an_autopilot_without_the_time_of_day_is_verified_once_it_has_heard_us()
     assert judged(ours, peer.pack()) is Verdict.VERIFIED
 
 
-def test_a_verified_later_stamp_moves_our_own_on() -> None:
+def test_a_verified_later_stamp_advances_ours() -> None:
     signer = Signer(KEY, 192)
     assert judged(Verifier(signer), signed(STAMP + 500)) is Verdict.VERIFIED
     assert int.from_bytes(signer.sign(unsigned(), NOW)[-12:-6], "little") == STAMP + 501
 
 
-def test_an_earlier_stamp_does_not_move_our_own_back() -> None:
+def test_an_earlier_stamp_does_not_set_ours_back() -> None:
     signer = Signer(KEY, 192, STAMP + 500)
     assert judged(Verifier(signer), signed(STAMP)) is Verdict.VERIFIED
     assert signer.stamp == STAMP + 500
 
 
-def test_the_last_of_all_stamps_raises_nothing() -> None:
+def test_the_last_stamp_does_not_raise() -> None:
     signer = Signer(KEY, 192)
     ours = Verifier(signer)
     assert judged(ours, signed(MAX_STAMP)) is Verdict.VERIFIED
@@ -284,16 +284,16 @@ def test_the_last_of_all_stamps_raises_nothing() -> None:
     assert len(signer.sign(unsigned(), NOW)) == len(unsigned()) + 13
 
 
-def test_streams_beyond_the_limit_are_refused_and_the_known_ones_live_on() -> None:
+def test_streams_beyond_the_limit_are_refused_and_the_known_ones_continue() -> None:
     ours = verifier()
     peers = [(system, component) for system in range(1, 256) for component in range(1, 9)][: MAX_STREAMS + 1]
     verdicts = [judged(ours, signed(STAMP, system=s, component=c)) for s, c in peers]
-    assert verdicts == [Verdict.VERIFIED] * MAX_STREAMS + [Verdict.CROWDED]
+    assert verdicts == [Verdict.VERIFIED] * MAX_STREAMS + [Verdict.TOO_MANY_STREAMS]
     assert judged(ours, signed(STAMP + 1)) is Verdict.VERIFIED
     assert judged(ours, signed(STAMP, OTHER_KEY, system=254)) is Verdict.FORGED
 
 
-def test_a_forged_frame_takes_no_stream() -> None:
+def test_a_forged_frame_creates_no_stream() -> None:
     ours = verifier()
     for system in range(1, 256):
         for link_id in range(6):
@@ -315,7 +315,7 @@ def test_a_forged_frame_takes_no_stream() -> None:
 def test_unsigned_frames_pass_as_configured(accept: str, heartbeats: Verdict, radio: Verdict) -> None:
     ours = verifier(accept_unsigned=accept)
     assert [judged(ours, unsigned(version=version)) for version in (1, 2)] == [heartbeats] * 2
-    (kept,) = Parser(None).feed(unsigned())  # with its bytes, signed or not
+    (kept,) = Parser(None).feed(unsigned())  # keeps the bytes, signed or not
     assert ours.judge(kept, NOW) is heartbeats
     assert [ours.judge(radio_status(message_id), NOW) for message_id in (109, 166)] == [radio] * 2
     assert ours.accepts(radio_status(), NOW) is (radio is Verdict.LET_THROUGH)
@@ -327,12 +327,12 @@ def test_a_radio_status_with_a_bad_signature_is_not_an_unsigned_one() -> None:
     assert verifier().judge(frame, NOW) is Verdict.FORGED
 
 
-def test_every_verdict_has_its_words_and_its_counter() -> None:
+def test_every_verdict_has_a_text_and_a_counter() -> None:
     assert set(WORDS) == set(Verdict) == set(verifier().counters)
     assert len(set(WORDS.values())) == len(Verdict)
 
 
-# whatever comes
+# any input
 
 PIECES = st.one_of(
     st.binary(max_size=40),
@@ -354,19 +354,19 @@ def test_no_bytes_raise(pieces: list[bytes], at: int, accept: str) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(st.binary(max_size=300), st.integers(0, 2**24 - 1))
-def test_no_frame_raises_and_none_is_verified_by_chance(raw: bytes, message_id: int) -> None:
+def test_no_frame_raises_or_is_verified_by_chance(raw: bytes, message_id: int) -> None:
     assert verifier().judge(Frame(message_id, (1, 1), 0, None, raw), NOW) is not Verdict.VERIFIED
 
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.integers(-(2**63), 2**63), st.integers(1, STAMP * 2)), max_size=20))
-def test_stamps_rise_whatever_the_clock_says_and_peers_send(moments: list[tuple[int, int]]) -> None:
+def test_stamps_rise_for_any_clock_and_any_peer(moments: list[tuple[int, int]]) -> None:
     signer = Signer(KEY, 192)
     ours = Verifier(signer)
     last = 0
-    for at, heard in moments:
+    for at, stamp in moments:
         at = min(at, NOW * 2)
-        ours.judge(frame_of(signed(heard)), at)
+        ours.judge(frame_of(signed(stamp)), at)
         stamp = int.from_bytes(signer.sign(unsigned(), at)[-12:-6], "little")
         assert stamp > last
         last = stamp

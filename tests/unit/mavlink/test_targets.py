@@ -1,4 +1,4 @@
-"""The table of targets is what dialects/generate_targets.py makes, and says what pymavlink's own modules say."""
+"""The table of targets is the output of dialects/generate_targets.py and agrees with pymavlink's modules."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PIN = re.search(r'"pymavlink==([\d.]+)"', (ROOT / "pyproject.toml").read_text())
 UPSTREAM_ONLY = {19, 80, 400, 401, 412, 413}
 
 
-def test_the_generated_file_is_what_the_generator_makes(tmp_path: pathlib.Path) -> None:
+def test_the_file_is_the_output_of_the_generator(tmp_path: pathlib.Path) -> None:
     assert PIN, "pyproject.toml pins pymavlink in the dev extra"
     if PIN[1] != PYMAVLINK:
         pytest.skip(f"the file is generated with pymavlink {PIN[1]}, here is {PYMAVLINK}")
@@ -46,14 +46,14 @@ def test_offsets_fit_a_payload() -> None:
 
 
 def offset(message: Any, field: str) -> int:
-    """Where a field stands, from the struct layout in pymavlink's generated module; -1: there is none."""
+    """The offset of a field, from the struct layout in pymavlink's generated module; -1: no such field."""
     if field not in message.ordered_fieldnames:
         return -1
     codes = re.findall(r"\d*[a-zA-Z]", message.unpacker.format)  # one for each field
     return struct.calcsize("<" + "".join(codes[: message.ordered_fieldnames.index(field)]))
 
 
-def test_the_table_says_what_pymavlinks_modules_say() -> None:
+def test_the_table_agrees_with_pymavlinks_modules() -> None:
     compared = set()
     for message_id, message in every_dialect.mavlink_map.items():
         if CRC_EXTRA.get(message_id) != message.crc_extra or message.msgname == "MANUAL_CONTROL":
@@ -65,7 +65,7 @@ def test_the_table_says_what_pymavlinks_modules_say() -> None:
         assert TARGETS.keys() - compared == UPSTREAM_ONLY | {69}
 
 
-def test_manual_control_names_its_target_otherwise() -> None:
+def test_manual_control_has_a_target_field_of_another_name() -> None:
     assert TARGETS[69] == (offset(every_dialect.mavlink_map[69], "target"), -1)
 
 

@@ -1,4 +1,4 @@
-"""A MAVLink port that remembers what it was given, and statuses to give to publishers."""
+"""A MAVLink port that records sent messages, and statuses for publishers."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Port:
         self.sent.append(Sent(message, system, audience.key))
 
     def taken(self) -> list[Sent]:
-        """What was sent since the last look."""
+        """The messages sent since the last call."""
         sent, self.sent = self.sent, []
         return sent
 
@@ -45,13 +45,13 @@ def msg(status: RobotStatus = QUIET, detail: Detail = SEEN, handle: str = "robot
 
 
 def publish(publisher: Publisher, at: float, *messages: RobotStatusMsg) -> float | None:
-    """Publish at a moment, in seconds; when the publisher wants to be called again."""
+    """Publish at a time in seconds; return when the publisher must be called again."""
     for message in messages:
         publisher.publish(message)
     return publisher.service(Instant(at, 0))
 
 
 def run(publisher: Publisher, seconds: float, period: float = 0.1, status: RobotStatus = QUIET) -> None:
-    """As a controller does from time 0 on, `seconds` included."""
+    """Publish periodically like a controller, from time 0 to `seconds` inclusive."""
     for tick in range(round(seconds / period) + 1):
         publish(publisher, tick * period, msg(status))

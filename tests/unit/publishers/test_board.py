@@ -26,7 +26,7 @@ from mav_robot_status.publishers.json_lines import native, native_body
 
 from .port import Port, msg
 
-MANUAL, AUTO = RobotStatus(RobotMode.MANUAL), RobotStatus(RobotMode.AUTO)
+MANUAL, AUTO = RobotStatus(mode=RobotMode.MANUAL), RobotStatus(mode=RobotMode.AUTO)
 
 
 def changes(board: Board, handle: str = "robot") -> list[tuple[str, Any, Any]]:
@@ -34,102 +34,102 @@ def changes(board: Board, handle: str = "robot") -> list[tuple[str, Any, Any]]:
 
 
 def test_an_entry_is_the_native_line() -> None:
-    detail = Detail(1, 1, (ErrorCause(2001, "RADIO", "Radio Failsafe", 5),), (Inhibit(1, "DISARMED", None, 7),))
+    detail = Detail(1, 1, (ErrorCause(2001, "RADIO", "Radio Failsafe", 5),), (Inhibit("DISARMED", None, 7),))
     message = RobotStatusMsg("robot", 1_000_000, MANUAL._replace(in_error=TriState.TRUE, error_code=2001), detail, 0.25)
     board = Board()
-    board.take(message, 1.0)
+    board.update(message, 1.0)
     whole = board.entries["robot"].whole()
     assert whole == json.loads(native(message, 0, native_body("robot", message.status, detail)))
     schema = json.loads((files("mav_robot_status") / "data" / "robot_status.schema.json").read_text())
     jsonschema.validate(whole, schema)
 
 
-def test_seq_counts_the_lines_and_the_version_those_that_changed_something() -> None:
+def test_seq_counts_lines_and_the_version_counts_changes() -> None:
     board = Board()
     for at in range(3):
-        board.take(msg(MANUAL)._replace(unix_us=at), at)
+        board.update(msg(MANUAL)._replace(unix_us=at), at)
     entry = board.entries["robot"]
     assert (entry.whole()["seq"], entry.version, board.version) == (2, 1, 1)
     assert (entry.began, entry.at, entry.stamp) == (0, 2, "1970-01-01T00:00:00.000002Z")
-    board.take(msg(AUTO), 3)
+    board.update(msg(AUTO), 3)
     assert (entry.version, board.version) == (2, 2)
 
 
 def test_an_entry_has_the_version_of_the_board_at_its_last_change() -> None:
     board = Board()
     for handle in ("a", "b", "c"):
-        board.take(msg(MANUAL, handle=handle), 0)
-    board.take(msg(AUTO, handle="a"), 1)
+        board.update(msg(MANUAL, handle=handle), 0)
+    board.update(msg(AUTO, handle="a"), 1)
     assert {handle: entry.version for handle, entry in board.entries.items()} == {"a": 4, "b": 2, "c": 3}
 
 
-def test_what_changes_is_a_transition_with_what_was_before() -> None:
+def test_a_change_is_a_transition_with_the_previous_value() -> None:
     board = Board()
-    board.take(msg(MANUAL), 0)
+    board.update(msg(MANUAL), 0)
     first = changes(board)
     assert ("mode", "MANUAL", None) in first
     assert ("link", "CONNECTED", None) in first
-    detail = Detail(1, 1, vehicle=Vehicle(flight_mode="GUIDED"), inhibits=(Inhibit(1, "DISARMED", "no", 0),))
-    board.take(msg(AUTO, detail), 1)
+    detail = Detail(1, 1, vehicle=Vehicle(flight_mode="GUIDED"), inhibits=(Inhibit("DISARMED", "no", 0),))
+    board.update(msg(AUTO, detail), 1)
     assert changes(board)[len(first) :] == [
         ("mode", "AUTO", "MANUAL"),
         ("flight_mode", "GUIDED", None),
         ("inhibit", {"name": "DISARMED", "text": "no", "begins": True}, None),
     ]
-    board.take(msg(AUTO, detail._replace(inhibits=(), link=LinkState.LOST)), 2)
+    board.update(msg(AUTO, detail._replace(inhibits=(), link=LinkState.LOST)), 2)
     assert changes(board)[-2:] == [
         ("link", "LOST", "CONNECTED"),
         ("inhibit", {"name": "DISARMED", "text": "no", "begins": False}, None),
     ]
 
 
-def test_transitions_are_forgotten_after_ten_minutes_and_when_there_are_many() -> None:
+def test_transitions_are_bounded_in_age_and_number() -> None:
     board = Board()
     for at in range(2000):
-        board.take(msg(AUTO if at % 2 else MANUAL), at / 100)
+        board.update(msg(AUTO if at % 2 else MANUAL), at / 100)
     transitions = board.entries["robot"].transitions
     assert len(transitions) == boards.MOST_TRANSITIONS
-    board.take(msg(AUTO._replace(in_error=TriState.FALSE)), 19.99 + boards.KEPT + 1)
+    board.update(msg(AUTO._replace(in_error=TriState.FALSE)), 19.99 + boards.KEPT + 1)
     assert [t.name for t in transitions] == ["in_error"]
 
 
-def test_there_are_no_more_handles_than_can_be_looked_at() -> None:
+def test_the_number_of_handles_is_bounded() -> None:
     board = Board()
     for number in range(boards.MOST_HANDLES + 3):
-        board.take_line(f"robot{number}", {}, 0)
+        board.update_line(f"robot{number}", {}, 0)
     assert (len(board.entries), board.refused) == (boards.MOST_HANDLES, 3)
 
 
 def test_the_same_line_from_another_process_makes_the_same_entry() -> None:
-    message = msg(AUTO, Detail(1, 1, inhibits=(Inhibit(1, "DISARMED", None, 7),)))
+    message = msg(AUTO, Detail(1, 1, inhibits=(Inhibit("DISARMED", None, 7),)))
     here, there = Board(), Board()
-    here.take(message, 1.0)
-    there.take_line("robot", json.loads(native(message, 40, native_body("robot", AUTO, message.detail))), 1.0)
+    here.update(message, 1.0)
+    there.update_line("robot", json.loads(native(message, 40, native_body("robot", AUTO, message.detail))), 1.0)
     assert there.entries["robot"].whole() == here.entries["robot"].whole()
     assert changes(there) == changes(here)
 
 
-def test_whatever_a_line_of_another_process_holds_it_is_taken() -> None:
+def test_any_content_of_a_line_of_another_process_is_accepted() -> None:
     board = Board()
     lines: list[dict[str, Any]] = [
         {}, {"link": 3}, {"errors": {"a": 1}}, {"errors": [1, {"name": []}]}, {"vehicle": []}, {"mode": ["x"]},
         {"system": "1", "component": []}, {"system": 1, "component": {}}, {"handle": {}}, {"stamp": None},
     ]  # fmt: skip
     for number, line in enumerate(lines):
-        board.take_line("robot", line, number)
-        board.take_line(f"robot{number}", line, number)
+        board.update_line("robot", line, number)
+        board.update_line(f"robot{number}", line, number)
     assert len(list(board)) == len(lines) + 1
     assert all(json.dumps(entry.whole()) for entry in board)
 
 
-def test_entries_come_by_system_and_those_without_last() -> None:
+def test_entries_are_in_order_of_system_and_those_without_ids_are_last() -> None:
     board = Board()
     for handle, system in (("x", None), ("b", 2), ("c", 10), ("a", 2)):
-        board.take(msg(AUTO, Detail(system, None if system is None else 1), handle), 0)
+        board.update(msg(AUTO, Detail(system, None if system is None else 1), handle), 0)
     assert [entry.line["handle"] for entry in board] == ["a", "b", "c", "x"]
 
 
-def test_the_publisher_puts_what_was_published_on_its_board() -> None:
+def test_the_publisher_puts_messages_on_its_board() -> None:
     publisher = BoardPublisher(PublisherContext({}, Port(), io.StringIO()))
     publisher.publish(msg(MANUAL))
     publisher.publish(msg(AUTO))

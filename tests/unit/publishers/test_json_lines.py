@@ -30,20 +30,26 @@ from .port import Port
 STAMP = 1_795_200_547_123_456
 NOW = Instant(10.0, STAMP)
 STATUS = RobotStatus(
-    RobotMode.AUTO, TriState.UNKNOWN, TriState.TRUE, TriState.FALSE, TriState.TRUE, TriState.TRUE, 2001
+    mode=RobotMode.AUTO,
+    e_stopped=TriState.UNKNOWN,
+    drives_powered=TriState.TRUE,
+    motion_possible=TriState.FALSE,
+    in_motion=TriState.TRUE,
+    in_error=TriState.TRUE,
+    error_code=2001,
 )
 DETAIL = Detail(
     1,
     1,
     (ErrorCause(2001, "RADIO_FAILSAFE", "Radio Failsafe", STAMP), ErrorCause(3005, "SENSOR_GPS", None, STAMP)),
-    (Inhibit(2, "E_STOPPED", None, STAMP),),
+    (Inhibit("E_STOPPED", None, STAMP),),
     Vehicle("ARDUPILOTMEGA", "GROUND_ROVER", "GUIDED", 15, "ACTIVE"),
 )
 MSG = RobotStatusMsg("robot", STAMP, STATUS, DETAIL, 0.4124)
 
 
 class Pipe:
-    """A standard output with a reader that reads when told to."""
+    """A standard output with a reader that reads on request."""
 
     def __init__(self) -> None:
         self.read_end, self.write_end = os.pipe()
@@ -77,7 +83,7 @@ def on(pipe: Pipe, patient: bool = False, **options: Any) -> JsonLinesPublisher:
     return JsonLinesPublisher(PublisherContext(options, Port(), pipe.stdout, patient))
 
 
-def test_a_native_line_is_as_the_contract_says(pipe: Pipe) -> None:
+def test_a_native_line_has_the_documented_form(pipe: Pipe) -> None:
     on(pipe).publish(MSG)
     stamp = "2026-11-20T18:49:07.123456Z"
     assert json.loads(pipe.read()) == {
@@ -132,7 +138,7 @@ def test_the_ros_2_form_lists_every_code(pipe: Pipe) -> None:
     assert codes == [[2001, 3005], [2001], []]
 
 
-def test_each_handle_is_counted_for_itself_and_a_negative_age_is_none(pipe: Pipe) -> None:
+def test_each_handle_has_its_own_seq_and_a_negative_age_is_zero(pipe: Pipe) -> None:
     publisher = on(pipe)
     for handle, age in (("a", -0.01), ("b", None), ("a", 1.0)):
         publisher.publish(MSG._replace(handle=handle, heartbeat_age=age))
@@ -142,7 +148,7 @@ def test_each_handle_is_counted_for_itself_and_a_negative_age_is_none(pipe: Pipe
     ]  # fmt: skip
 
 
-def test_a_new_status_or_detail_is_written_though_the_last_was_kept(pipe: Pipe) -> None:
+def test_a_new_status_or_detail_replaces_the_cached_body(pipe: Pipe) -> None:
     publisher = on(pipe)
     publisher.publish(MSG)
     publisher.publish(MSG._replace(status=RobotStatus()))
@@ -151,7 +157,7 @@ def test_a_new_status_or_detail_is_written_though_the_last_was_kept(pipe: Pipe) 
     assert modes == [("AUTO", "CONNECTED"), ("UNKNOWN", "CONNECTED"), ("UNKNOWN", "LOST")]
 
 
-def test_a_full_pipe_is_busy_and_goes_on_where_it_was(pipe: Pipe) -> None:
+def test_a_full_pipe_is_busy_and_resumes_where_it_stopped(pipe: Pipe) -> None:
     publisher = on(pipe)
     long_text = ErrorCause(1, "X", "x" * 10_000, STAMP)
     msg = MSG._replace(detail=DETAIL._replace(errors=(long_text,)))
@@ -170,18 +176,18 @@ def test_a_full_pipe_is_busy_and_goes_on_where_it_was(pipe: Pipe) -> None:
     assert max(map(len, data.splitlines())) > PIPE_BUF
 
 
-def test_a_reader_that_has_gone_is_noticed_when_writing_and_when_idle(pipe: Pipe) -> None:
+def test_a_closed_reader_is_noticed_when_writing_and_when_idle(pipe: Pipe) -> None:
     publisher = on(pipe)
     assert publisher.service(NOW) is None
     pipe.leave()
     with pytest.raises(BrokenPipeError):
         publisher.busy()
-    assert publisher.service(Instant(NOW.mono + 0.5, 0)) is None  # not looked at each time
+    assert publisher.service(Instant(NOW.mono + 0.5, 0)) is None  # not checked each time
     with pytest.raises(BrokenPipeError):
         publisher.service(Instant(NOW.mono + 1.0, 0))
 
 
-def test_on_replay_nothing_is_lost_and_lines_go_out_at_the_end(pipe: Pipe) -> None:
+def test_a_replay_loses_no_line_and_flushes_at_the_end(pipe: Pipe) -> None:
     publisher = on(pipe, patient=True)
     for _ in range(50):
         assert not publisher.busy()
@@ -199,7 +205,7 @@ def test_a_file_is_appended_to_and_closed(tmp_path: Path) -> None:
     assert len(path.read_text("utf-8").splitlines()) == 2
 
 
-def test_a_full_disk_is_an_error_for_the_person() -> None:
+def test_a_full_disk_is_a_link_error() -> None:
     publisher = JsonLinesPublisher(PublisherContext({"path": "/dev/full"}, Port(), io.StringIO()))
     with pytest.raises(LinkError, match="cannot write JSON lines to /dev/full: No space left on device"):
         publisher.publish(MSG)
@@ -209,13 +215,16 @@ def test_a_full_disk_is_an_error_for_the_person() -> None:
 
 @pytest.mark.parametrize(
     ("options", "says"),
-    [({"format": "xml"}, "'xml' is none of native, ros1, ros2"), ({"colour": 1}, "unknown option 'colour'")],
+    [
+        ({"format": "xml"}, "json: format: must be one of native, ros1, ros2, not 'xml'"),
+        ({"colour": 1}, "unknown option 'colour'"),
+    ],
 )
-def test_wrong_options_are_errors_for_the_person(pipe: Pipe, options: dict[str, Any], says: str) -> None:
+def test_wrong_options_are_usage_errors(pipe: Pipe, options: dict[str, Any], says: str) -> None:
     with pytest.raises(UsageError, match=says):
         on(pipe, **options)
 
 
-def test_changes_only_wants_no_periodic_lines(pipe: Pipe) -> None:
+def test_changes_only_is_not_periodic(pipe: Pipe) -> None:
     assert on(pipe).periodic
     assert not on(pipe, changes_only=True).periodic

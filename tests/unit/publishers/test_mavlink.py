@@ -39,22 +39,28 @@ def failing(code: int, detail: Detail = SEEN) -> RobotStatusMsg:
     return msg(RobotStatus(error_code=code), detail)
 
 
-def test_a_message_says_all_of_a_status() -> None:
+def test_a_message_has_every_field_of_a_status() -> None:
     status = RobotStatus(
-        RobotMode.AUTO, TriState.UNKNOWN, TriState.TRUE, TriState.FALSE, TriState.TRUE, TriState.TRUE, 9
+        mode=RobotMode.AUTO,
+        e_stopped=TriState.UNKNOWN,
+        drives_powered=TriState.TRUE,
+        motion_possible=TriState.FALSE,
+        in_motion=TriState.TRUE,
+        in_error=TriState.TRUE,
+        error_code=9,
     )
-    detail = Detail(4, 1, inhibits=(Inhibit(1, "DISARMED", None, 0), Inhibit(4, "PREARM_FAILING", "x", 0)))
+    detail = Detail(4, 1, inhibits=(Inhibit("DISARMED", None, 0), Inhibit("PREARM_FAILING", "x", 0)))
     message = message_of(RobotStatusMsg("robot", 77, status, detail, None))
     assert message == (77, 9, 0b10010, 4, 1, 2, -1, 1, 0, 1, 1)
 
 
 @pytest.mark.parametrize("period", [0.1, 0.3, 0.7])
-def test_any_rate_is_thinned_to_1_hz_on_average(publisher: MavlinkPublisher, port: Port, period: float) -> None:
+def test_any_rate_is_limited_to_1_hz_on_average(publisher: MavlinkPublisher, port: Port, period: float) -> None:
     run(publisher, 60, period)
     assert len(port.sent) == pytest.approx(60, abs=1)
 
 
-def test_a_change_goes_out_at_once_and_at_most_5_a_second_with_the_last_always_sent(
+def test_changes_are_sent_at_once_at_most_5_a_second_and_the_last_is_always_sent(
     publisher: MavlinkPublisher, port: Port
 ) -> None:
     publish(publisher, 0.0, failing(0))
@@ -66,25 +72,25 @@ def test_a_change_goes_out_at_once_and_at_most_5_a_second_with_the_last_always_s
     assert port.sent[-1].message.error_code == 19
 
 
-def test_after_a_pause_the_phase_begins_anew(publisher: MavlinkPublisher, port: Port) -> None:
+def test_after_a_pause_the_phase_restarts(publisher: MavlinkPublisher, port: Port) -> None:
     for at in (0.0, 60.0, 60.5, 60.9):
         publish(publisher, at, msg())
     assert len(port.sent) == 2
 
 
-def test_of_a_vehicle_never_heard_nothing_is_said(publisher: MavlinkPublisher, port: Port) -> None:
+def test_nothing_is_sent_before_the_first_heartbeat_of_a_vehicle(publisher: MavlinkPublisher, port: Port) -> None:
     unheard, unnamed = Detail(5, None, link=LinkState.NEVER_SEEN), Detail(None, None)
     port.asked = [("station", 5)]
     assert publish(publisher, 0.0, msg(detail=unheard), msg(detail=unnamed, handle="other")) is None
     assert port.sent == []
 
 
-def test_a_lost_vehicle_is_still_spoken_of(publisher: MavlinkPublisher, port: Port) -> None:
+def test_a_lost_vehicle_is_still_published(publisher: MavlinkPublisher, port: Port) -> None:
     publish(publisher, 0.0, msg(detail=Detail(5, 1, link=LinkState.LOST)))
     assert [s.system for s in port.sent] == [5]
 
 
-def test_handles_are_thinned_each_for_itself(publisher: MavlinkPublisher, port: Port) -> None:
+def test_each_handle_has_its_own_rate_limit(publisher: MavlinkPublisher, port: Port) -> None:
     publish(publisher, 0.0, msg(handle="a"), msg(handle="b", detail=Detail(2, 1)))
     assert [s.system for s in port.sent] == [1, 2]
     assert not publisher.busy()
@@ -92,7 +98,7 @@ def test_handles_are_thinned_each_for_itself(publisher: MavlinkPublisher, port: 
 
 
 @pytest.mark.parametrize(("interval", "in_10_s"), [(0.1, 101), (0.25, 41), (0.05, 101), (5.0, 3)])
-def test_an_audience_hears_as_often_as_it_asked_but_no_more_than_is_published(
+def test_an_audience_gets_its_interval_but_no_more_than_is_published(
     publisher: MavlinkPublisher, port: Port, interval: float, in_10_s: int
 ) -> None:
     port.present = [STATION._replace(interval=interval), ROVER]
@@ -101,28 +107,28 @@ def test_an_audience_hears_as_often_as_it_asked_but_no_more_than_is_published(
     assert [s.key for s in port.sent].count("rover") == 11
 
 
-def test_what_is_published_a_little_early_is_not_left_out(publisher: MavlinkPublisher, port: Port) -> None:
+def test_a_slightly_early_message_is_sent(publisher: MavlinkPublisher, port: Port) -> None:
     port.present = [STATION._replace(interval=0.1)]
     for tick in range(100):
         publish(publisher, tick * 0.1 + (0.006 if tick % 2 == 0 else 0.0), msg())
     assert len(port.sent) == 100
 
 
-def test_whoever_asked_for_a_long_interval_still_hears_changes(publisher: MavlinkPublisher, port: Port) -> None:
+def test_an_audience_with_a_long_interval_still_gets_changes(publisher: MavlinkPublisher, port: Port) -> None:
     port.present = [STATION._replace(interval=60.0)]
     run(publisher, 1.0)
     publish(publisher, 1.1, failing(7))
     assert [s.message.error_code for s in port.sent] == [0, 7]
 
 
-def test_whoever_wants_none_hears_nothing_not_even_changes(publisher: MavlinkPublisher, port: Port) -> None:
+def test_an_audience_with_messages_disabled_gets_no_changes_either(publisher: MavlinkPublisher, port: Port) -> None:
     port.present = [STATION._replace(interval=math.inf), ROVER]
     run(publisher, 5.0)
     assert publish(publisher, 5.1, failing(7)) is None
     assert {s.key for s in port.sent} == {"rover"}
 
 
-def test_an_audience_that_appears_hears_at_once_how_things_are(publisher: MavlinkPublisher, port: Port) -> None:
+def test_a_new_audience_gets_the_last_status_at_once(publisher: MavlinkPublisher, port: Port) -> None:
     publish(publisher, 0.0, failing(7))
     port.taken()
     port.present.append(ROVER)
@@ -132,7 +138,7 @@ def test_an_audience_that_appears_hears_at_once_how_things_are(publisher: Mavlin
     assert port.sent == []
 
 
-def test_what_was_published_long_ago_is_not_sent_again_by_itself(publisher: MavlinkPublisher, port: Port) -> None:
+def test_an_old_message_is_not_repeated(publisher: MavlinkPublisher, port: Port) -> None:
     publish(publisher, 0.0, msg())
     port.taken()
     port.present.append(ROVER)
@@ -140,7 +146,9 @@ def test_what_was_published_long_ago_is_not_sent_again_by_itself(publisher: Mavl
     assert [s.key for s in port.sent] == ["rover"]
 
 
-def test_what_is_not_known_any_more_is_told_to_nobody(publisher: MavlinkPublisher, port: Port) -> None:
+def test_a_vehicle_that_became_never_seen_is_not_sent_to_a_new_audience(
+    publisher: MavlinkPublisher, port: Port
+) -> None:
     publish(publisher, 0.0, msg())
     port.taken()
     publish(publisher, 0.1, msg(detail=Detail(1, None, link=LinkState.NEVER_SEEN)))
@@ -151,7 +159,7 @@ def test_what_is_not_known_any_more_is_told_to_nobody(publisher: MavlinkPublishe
 
 
 @pytest.mark.parametrize("pause", [[], [STATION._replace(interval=math.inf)]])
-def test_an_audience_that_comes_back_is_told_at_once(
+def test_a_returning_audience_gets_the_last_status_at_once(
     publisher: MavlinkPublisher, port: Port, pause: list[Audience]
 ) -> None:
     publish(publisher, 0.0, msg())
@@ -163,15 +171,15 @@ def test_an_audience_that_comes_back_is_told_at_once(
     assert [s.key for s in port.sent] == ["station"]
 
 
-def test_nothing_is_remembered_of_audiences_that_have_gone(publisher: MavlinkPublisher, port: Port) -> None:
+def test_the_state_of_a_gone_audience_is_deleted(publisher: MavlinkPublisher, port: Port) -> None:
     for number in range(100):
         port.present = [Audience(number)]
         publish(publisher, number * 0.1, msg())
     assert len(port.sent) == 100
-    assert list(publisher._told) == [99]
+    assert list(publisher._states) == [99]
 
 
-def test_a_change_is_held_back_only_from_those_who_have_heard_enough(publisher: MavlinkPublisher, port: Port) -> None:
+def test_each_audience_has_its_own_limit_on_changes(publisher: MavlinkPublisher, port: Port) -> None:
     for number in range(6):
         publish(publisher, number * 0.01, failing(number))
     port.taken()
@@ -183,7 +191,7 @@ def test_a_change_is_held_back_only_from_those_who_have_heard_enough(publisher: 
 
 
 @pytest.mark.parametrize("interval", [None, math.inf])
-def test_who_asks_once_is_told_once_and_at_once(
+def test_a_single_request_is_answered_once_and_at_once(
     publisher: MavlinkPublisher, port: Port, interval: float | None
 ) -> None:
     port.present = [STATION._replace(interval=interval), ROVER]
@@ -195,7 +203,7 @@ def test_who_asks_once_is_told_once_and_at_once(
     assert [(s.key, s.system, s.message.error_code) for s in port.sent] == [("station", 1, 7)]
 
 
-def test_who_asks_and_goes_is_not_answered(publisher: MavlinkPublisher, port: Port) -> None:
+def test_a_request_of_a_gone_audience_is_not_answered(publisher: MavlinkPublisher, port: Port) -> None:
     publish(publisher, 0.0, msg())
     port.taken()
     port.asked = [("gone", 1), ("station", 9)]

@@ -1,4 +1,4 @@
-"""Metrics as Prometheus' text."""
+"""Metrics in the text format of Prometheus."""
 
 from __future__ import annotations
 
@@ -22,12 +22,20 @@ from mav_robot_status.interface import (
 from mav_robot_status.publishers.metrics import CONNECTION, GATEWAY, PREFIX, PUBLISHER, VEHICLE, exposition
 
 YES, NO, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
-STATUS = RobotStatus(RobotMode.AUTO, NO, YES, NO, UNKNOWN, YES, 2001)
+STATUS = RobotStatus(
+    mode=RobotMode.AUTO,
+    e_stopped=NO,
+    drives_powered=YES,
+    motion_possible=NO,
+    in_motion=UNKNOWN,
+    in_error=YES,
+    error_code=2001,
+)
 DETAIL = Detail(
     1,
     1,
     (ErrorCause(2001, "RC_LOST", "Radio failsafe on", 0), ErrorCause(2004, "BATTERY_CRITICAL", None, 0)),
-    (Inhibit(1, "DISARMED", None, 0),),
+    (Inhibit("DISARMED", None, 0),),
     Vehicle("ARDUPILOTMEGA", "GROUND_ROVER", "AUTO", 10, "ACTIVE"),
 )
 ROVER = RobotStatusMsg("rover", 0, STATUS, DETAIL, 0.25)
@@ -37,7 +45,7 @@ OF_ROVER = 'handle="rover",system="1",component="1"'
 
 
 def samples(*vehicles: RobotStatusMsg, **others: object) -> dict[str, str]:
-    """By name and labels, without the prefix."""
+    """The samples by name and labels, without the prefix."""
     text = exposition(Metrics(vehicles, **others))  # type: ignore[arg-type]
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     found = dict(line.rsplit(" ", 1) for line in lines)
@@ -57,7 +65,7 @@ def test_a_connected_vehicle_is_up_and_its_heartbeat_has_an_age() -> None:
     assert found[f"heartbeat_age_seconds{{{OF_ROVER}}}"] == "0.25"
 
 
-def test_a_lost_vehicle_is_not_up_and_its_age_goes_on() -> None:
+def test_a_lost_vehicle_is_not_up_and_its_age_still_grows() -> None:
     found = samples(ROVER._replace(detail=DETAIL._replace(link=LinkState.LOST), heartbeat_age=90.0))
     assert found[f"link_up{{{OF_ROVER}}}"] == "0"
     assert found[f"heartbeat_age_seconds{{{OF_ROVER}}}"] == "90"
@@ -74,11 +82,11 @@ def test_each_active_cause_and_reason_is_a_series_and_no_other() -> None:
     assert not [series for series in samples(UNHEARD) if series.startswith(("error{", "inhibit{"))]
 
 
-def test_an_autopilots_own_words_are_no_label() -> None:
+def test_a_text_of_an_autopilot_is_never_a_label() -> None:
     assert "Radio failsafe" not in exposition(Metrics((ROVER,)))
 
 
-def test_a_vehicle_that_was_never_heard_has_no_age_and_no_words() -> None:
+def test_a_vehicle_without_a_heartbeat_has_no_age_and_no_info() -> None:
     found = samples(UNHEARD)
     of_boat = 'handle="boat",system="",component=""'
     assert found[f"link_up{{{of_boat}}}"] == "0"
@@ -86,7 +94,7 @@ def test_a_vehicle_that_was_never_heard_has_no_age_and_no_words() -> None:
     assert not [series for series in found if series.startswith(("heartbeat_age", "vehicle_info"))]
 
 
-def test_a_connection_tells_what_came_and_what_was_wrong_with_it() -> None:
+def test_a_connection_counts_frames_and_errors() -> None:
     of_link = 'connection="udp:0.0.0.0:14550",role="vehicle"'
     assert {s: v for s, v in samples(connections=(LINK,)).items() if s.startswith("connection")} == {
         f"connection_frames_total{{{of_link}}}": "100",
@@ -101,25 +109,25 @@ def test_a_connection_tells_what_came_and_what_was_wrong_with_it() -> None:
     }
 
 
-def test_two_connections_of_one_name_are_added_up_because_a_series_may_stand_there_once() -> None:
+def test_two_connections_with_the_same_name_are_added_because_a_series_must_be_unique() -> None:
     found = samples(connections=(LINK, LINK, LINK._replace(is_out=True)))
     assert found['connection_frames_total{connection="udp:0.0.0.0:14550",role="vehicle"}'] == "200"
     assert found['connection_frames_total{connection="udp:0.0.0.0:14550",role="out"}'] == "100"
 
 
-def test_a_publisher_tells_its_queue_and_its_drops() -> None:
+def test_a_publisher_has_the_length_of_its_queue_and_its_drops() -> None:
     found = samples(publishers=(PublisherMetrics("json", 1, 3, 4), PublisherMetrics("json", 2, 0, 0)))
     assert found['publisher_queued_messages{publisher="json",number="1"}'] == "3"
     assert found['publisher_dropped_messages_total{publisher="json",number="1"}'] == "4"
     assert found['publisher_dropped_messages_total{publisher="json",number="2"}'] == "0"
 
 
-def test_a_recording_has_a_series_only_where_there_is_one() -> None:
+def test_a_gateway_without_a_recording_has_no_series_for_it() -> None:
     assert samples(record_dropped=0)["record_dropped_frames_total"] == "0"
     assert not [series for series in samples() if series.startswith("record")]
 
 
-def test_a_gateway_that_hears_nothing_still_says_what_it_is() -> None:
+def test_a_gateway_without_vehicles_still_has_its_build_info() -> None:
     assert samples() == {f'build_info{{version="{__version__}"}}': "1"}
 
 
@@ -133,7 +141,7 @@ def test_large_counters_keep_every_digit() -> None:
     assert "123456789012345" in samples(connections=(big,)).values()
 
 
-def test_every_family_is_introduced_once_and_has_all_its_lines_in_one_piece() -> None:
+def test_every_family_has_one_header_and_consecutive_lines() -> None:
     text = exposition(Metrics((ROVER, UNHEARD), (LINK,), (PublisherMetrics("json", 1, 0, 0),), 0))
     heads = re.findall(r"^# HELP (\S+) .+\n# TYPE \1 (gauge|counter)\n\1[{ ]", text, re.MULTILINE)
     assert [name.removeprefix(PREFIX) for name, _ in heads] == [

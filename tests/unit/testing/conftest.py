@@ -1,4 +1,4 @@
-"""The other end of the fake autopilot: a plain UDP socket that decodes with pymavlink."""
+"""The peer of the fake autopilot: a plain UDP socket."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from mav_robot_status.mavlink.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 from mav_robot_status.testing import FakeAutopilot, ManualClock, Scenario, decode
+from tests.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 
 TICK = 0.05
 
 
 class Listener:
-    """Stands for the gateway: hears all that the fake sends, and can send."""
+    """Replaces the gateway: receives the messages of the fake autopilot, and can send."""
 
     def __init__(self) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -25,8 +25,8 @@ class Listener:
         self.address: tuple[str, int] = self.socket.getsockname()
         self.mav = MAVLink(None, srcSystem=1, srcComponent=192)
 
-    def hear(self, kind: str | None = None) -> list[Any]:
-        """All that has arrived since the last call."""
+    def receive(self, kind: str | None = None) -> list[Any]:
+        """The messages since the last call."""
         messages: list[Any] = []
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -45,7 +45,7 @@ class Listener:
 
 
 class Stage:
-    """A fake autopilot, a listener, and a clock that passes only here."""
+    """A fake autopilot, a listener, and a manual clock."""
 
     def __init__(self, listener: Listener, autopilot: FakeAutopilot) -> None:
         self.listener = listener
@@ -54,15 +54,15 @@ class Stage:
         autopilot.poll(self.clock.now())
 
     def play(self, seconds: float, kind: str | None = None) -> list[Any]:
-        """Let time pass in small steps; what was heard meanwhile."""
-        heard: list[Any] = []
+        """Advance the time in small steps. Return the received messages."""
+        received: list[Any] = []
         for _ in range(round(seconds / TICK)):
             self.autopilot.poll(self.clock.advance(TICK))
-            heard += self.listener.hear(kind)
-        return heard
+            received += self.listener.receive(kind)
+        return received
 
-    def ask(self, command: int, *params: float) -> Any:
-        """Send a command; the answer to it."""
+    def command(self, command: int, *params: float) -> Any:
+        """Send a command. Return its acknowledgement."""
         self.listener.command(self.autopilot, command, *params)
         (ack,) = self.play(TICK, "COMMAND_ACK")
         return ack
@@ -77,7 +77,7 @@ def listener() -> Iterator[Listener]:
 
 @pytest.fixture
 def stage(listener: Listener) -> Iterator[Any]:
-    """A function that puts a scenario on stage."""
+    """A function that makes a `Stage` for a scenario."""
     with contextlib.ExitStack() as stack:
 
         def build(scenario: Scenario, **options: Any) -> Stage:

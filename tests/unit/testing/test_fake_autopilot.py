@@ -26,23 +26,23 @@ def texts(messages: list[Any]) -> list[str]:
 
 
 def test_a_silent_listener_of_a_copter_gets_heartbeats_only(stage: Any) -> None:
-    heard = stage(arducopter.MANUAL).play(12.0)
-    assert kinds(heard) == {"HEARTBEAT"}
-    assert len(heard) == 12 + 1 + 1  # the first at once, one for the mode change
+    received = stage(arducopter.MANUAL).play(12.0)
+    assert kinds(received) == {"HEARTBEAT"}
+    assert len(received) == 12 + 1 + 1  # one at once, one for the mode change
 
 
-def test_a_requested_stream_flows_at_the_asked_rate(stage: Any) -> None:
+def test_a_requested_stream_has_the_requested_rate(stage: Any) -> None:
     at = stage(arducopter.READY)
-    assert at.ask(SET_MESSAGE_INTERVAL, 33, 250_000).result == ACCEPTED
+    assert at.command(SET_MESSAGE_INTERVAL, 33, 250_000).result == ACCEPTED
     assert len(at.play(10.0, "GLOBAL_POSITION_INT")) == 40
-    at.ask(SET_MESSAGE_INTERVAL, 33, -1)
+    at.command(SET_MESSAGE_INTERVAL, 33, -1)
     assert at.play(3.0, "GLOBAL_POSITION_INT") == []
 
 
 def test_interval_zero_is_the_default_rate(stage: Any) -> None:
     at = stage(px4.READY)
-    at.ask(SET_MESSAGE_INTERVAL, 33, 20_000_000)
-    at.ask(SET_MESSAGE_INTERVAL, 33, 0)
+    at.command(SET_MESSAGE_INTERVAL, 33, 20_000_000)
+    at.command(SET_MESSAGE_INTERVAL, 33, 0)
     assert len(at.play(4.0, "GLOBAL_POSITION_INT")) == 20
 
 
@@ -51,10 +51,10 @@ def test_interval_zero_is_the_default_rate(stage: Any) -> None:
     [(1, 1e6, ACCEPTED), (245, 5e5, ACCEPTED), (9999, 1e6, FAILED), (436, 1e6, FAILED), (1, -7, DENIED),
      (float("nan"), 1e6, FAILED), (1, float("nan"), DENIED), (1, float("inf"), ACCEPTED)],
 )  # fmt: skip
-def test_set_message_interval_is_answered_as_ardupilot_answers(
+def test_set_message_interval_has_the_answers_of_ardupilot(
     stage: Any, message_id: float, microseconds: float, result: int
 ) -> None:
-    ack = stage(ardurover.READY).ask(SET_MESSAGE_INTERVAL, message_id, microseconds)
+    ack = stage(ardurover.READY).command(SET_MESSAGE_INTERVAL, message_id, microseconds)
     assert (ack.command, ack.result) == (SET_MESSAGE_INTERVAL, result)
     assert (ack.target_system, ack.target_component) == (1, 192)
 
@@ -72,9 +72,14 @@ def test_the_old_stream_request_works_on_ardupilot(stage: Any) -> None:
 
 def test_px4_streams_by_itself_but_texts_only_to_a_ground_station(stage: Any) -> None:
     at = stage(px4.RC_FAILSAFE)
-    heard = Counter(m.get_type() for m in at.play(4.0))
-    assert (heard["HEARTBEAT"], heard["SYS_STATUS"], heard["GLOBAL_POSITION_INT"], heard["ATTITUDE"]) == (5, 4, 20, 60)
-    assert heard["STATUSTEXT"] == 0
+    received = Counter(m.get_type() for m in at.play(4.0))
+    assert (received["HEARTBEAT"], received["SYS_STATUS"], received["GLOBAL_POSITION_INT"], received["ATTITUDE"]) == (
+        5,
+        4,
+        20,
+        60,
+    )
+    assert received["STATUSTEXT"] == 0
     at.listener.ground_station_heartbeat(at.autopilot)
     assert "Failsafe activated: entering Hold for 5 seconds\t" in texts(at.play(8.0))
 
@@ -93,22 +98,22 @@ def test_arming_is_refused_while_the_checks_fail(stage: Any) -> None:
     at = stage(ardurover.PREARM_FAILING)
     at.play(3.0)
     at.listener.command(at.autopilot, ARM_DISARM, 1)
-    heard = at.play(0.1)
-    assert [m.result for m in heard if m.get_type() == "COMMAND_ACK"] == [FAILED]
-    assert "Arm: Compass not healthy" in texts(heard)
+    received = at.play(0.1)
+    assert [m.result for m in received if m.get_type() == "COMMAND_ACK"] == [FAILED]
+    assert "Arm: Compass not healthy" in texts(received)
     assert not at.autopilot.state.armed
-    assert at.ask(ARM_DISARM, 1, 21196).result == ACCEPTED  # forced
+    assert at.command(ARM_DISARM, 1, 21196).result == ACCEPTED  # forced
     assert at.autopilot.state.armed
 
 
-def test_px4_refuses_with_a_result_and_a_text_of_its_own(stage: Any) -> None:
+def test_px4_refuses_with_its_result_and_its_text(stage: Any) -> None:
     at = stage(px4.PREARM_FAILING)
     at.listener.ground_station_heartbeat(at.autopilot)
     at.play(2.5)
     at.listener.command(at.autopilot, ARM_DISARM, 1)
-    heard = at.play(0.1)
-    assert [m.result for m in heard if m.get_type() == "COMMAND_ACK"] == [TEMPORARILY_REJECTED]
-    assert texts(heard) == ["Arming denied: Resolve system health failures firs", "t\t"]
+    received = at.play(0.1)
+    assert [m.result for m in received if m.get_type() == "COMMAND_ACK"] == [TEMPORARILY_REJECTED]
+    assert texts(received) == ["Arming denied: Resolve system health failures firs", "t\t"]
 
 
 def test_arming_and_disarming_are_announced(stage: Any) -> None:
@@ -122,16 +127,16 @@ def test_arming_and_disarming_are_announced(stage: Any) -> None:
 def test_a_flying_copter_is_not_disarmed_unless_forced(stage: Any) -> None:
     at = stage(arducopter.MANUAL)
     at.play(9.0)
-    assert at.ask(ARM_DISARM, 0).result == FAILED
-    assert at.ask(ARM_DISARM, 0, 21196).result == ACCEPTED
+    assert at.command(ARM_DISARM, 0).result == FAILED
+    assert at.command(ARM_DISARM, 0, 21196).result == ACCEPTED
 
 
-def test_a_mode_is_taken_over_and_told_at_once(stage: Any) -> None:
+def test_a_mode_change_is_applied_and_reported_at_once(stage: Any) -> None:
     at = stage(ardurover.READY)
     at.listener.command(at.autopilot, DO_SET_MODE, 1, 10)
-    heard = at.play(0.05)
-    assert [m.custom_mode for m in heard if m.get_type() == "HEARTBEAT"] == [0, 10]
-    assert [m.result for m in heard if m.get_type() == "COMMAND_ACK"] == [ACCEPTED]
+    received = at.play(0.05)
+    assert [m.custom_mode for m in received if m.get_type() == "HEARTBEAT"] == [0, 10]
+    assert [m.result for m in received if m.get_type() == "COMMAND_ACK"] == [ACCEPTED]
 
 
 def test_the_old_set_mode_message_is_acknowledged_too(stage: Any) -> None:
@@ -151,24 +156,24 @@ def test_px4_answers_a_mode_command_twice(stage: Any) -> None:
 @pytest.mark.parametrize("params", [(1, 99), (0, 4), (1, float("nan")), (float("inf"), 4)])
 def test_an_impossible_mode_is_refused(stage: Any, params: tuple[float, ...]) -> None:
     at = stage(ardurover.READY)
-    assert at.ask(DO_SET_MODE, *params).result in (DENIED, FAILED)
+    assert at.command(DO_SET_MODE, *params).result in (DENIED, FAILED)
     assert at.autopilot.state.custom_mode == 0
 
 
 def test_a_message_can_be_requested_once(stage: Any) -> None:
     at = stage(ardurover.READY)
     at.listener.command(at.autopilot, 512, 1)
-    heard = at.play(2.0)
-    assert [m.result for m in heard if m.get_type() == "COMMAND_ACK"] == [ACCEPTED]
-    assert sum(m.get_type() == "SYS_STATUS" for m in heard) == 1
+    received = at.play(2.0)
+    assert [m.result for m in received if m.get_type() == "COMMAND_ACK"] == [ACCEPTED]
+    assert sum(m.get_type() == "SYS_STATUS" for m in received) == 1
 
 
 @pytest.mark.parametrize("command", [(512, 148), (512, 435), (185, 1)])
-def test_what_it_cannot_do_is_unsupported(stage: Any, command: tuple[int, float]) -> None:
-    assert stage(ardurover.READY).ask(*command).result == UNSUPPORTED
+def test_an_unknown_command_is_unsupported(stage: Any, command: tuple[int, float]) -> None:
+    assert stage(ardurover.READY).command(*command).result == UNSUPPORTED
 
 
-def test_a_parameter_is_read_by_name_and_unknown_ones_are_passed_over_in_silence(stage: Any) -> None:
+def test_a_parameter_is_read_by_name_and_unknown_ones_have_no_answer(stage: Any) -> None:
     at = stage(ardurover.READY)
     for name in (b"SERVO3_FUNCTION", b"SERVO4_FUNCTION", b"NO_SUCH_PARAM"):
         at.listener.send(at.listener.mav.param_request_read_encode(1, 1, name, -1), at.autopilot)
@@ -178,35 +183,37 @@ def test_a_parameter_is_read_by_name_and_unknown_ones_are_passed_over_in_silence
     ]
 
 
-def test_what_is_meant_for_another_vehicle_is_not_answered(stage: Any) -> None:
+def test_a_message_for_another_vehicle_is_not_answered(stage: Any) -> None:
     at = stage(ardurover.READY, system=2)
     at.listener.command(at.autopilot, ARM_DISARM, 1)  # to system 1
     assert at.play(1.0, "COMMAND_ACK") == []
     assert at.autopilot.heard("COMMAND_LONG") == []
 
 
-def test_several_vehicles_speak_with_their_own_ids(stage: Any) -> None:
+def test_several_vehicles_send_with_their_own_ids(stage: Any) -> None:
     vehicles = [
         stage(scenario, system=n, component=n + 4) for n, scenario in enumerate((ardurover.READY, px4.READY), 1)
     ]
-    heard = [m for at in vehicles for m in at.play(1.0, "HEARTBEAT")]
-    assert {(m.get_srcSystem(), m.get_srcComponent(), m.autopilot) for m in heard} == {(1, 5, 3), (2, 6, 12)}
+    received = [m for at in vehicles for m in at.play(1.0, "HEARTBEAT")]
+    assert {(m.get_srcSystem(), m.get_srcComponent(), m.autopilot) for m in received} == {(1, 5, 3), (2, 6, 12)}
 
 
 # Scenarios
 
 
-def test_a_scenario_changes_what_is_sent_at_its_times(stage: Any) -> None:
+def test_a_scenario_changes_the_messages_at_its_times(stage: Any) -> None:
     at = stage(ardurover.RC_FAILSAFE)
-    at.ask(SET_MESSAGE_INTERVAL, 1, 500_000)
+    at.command(SET_MESSAGE_INTERVAL, 1, 500_000)
     seen = {}
     for second in range(1, 20):
-        heard = at.play(1.0)
-        seen[second] = [(m.custom_mode, m.base_mode, m.system_status) for m in heard if m.get_type() == "HEARTBEAT"][-1]
+        received = at.play(1.0)
+        seen[second] = [(m.custom_mode, m.base_mode, m.system_status) for m in received if m.get_type() == "HEARTBEAT"][
+            -1
+        ]
         if second == 9:
-            assert "Radio Failsafe" in texts(heard)
+            assert "Radio Failsafe" in texts(received)
         if second == 15:
-            assert texts(heard) == ["Radio Failsafe Cleared"]
+            assert texts(received) == ["Radio Failsafe Cleared"]
     assert seen[2] == (0, 65, 4)
     assert seen[4] == (0, 193, 4)
     assert seen[7] == (10, 137, 4)
@@ -215,7 +222,7 @@ def test_a_scenario_changes_what_is_sent_at_its_times(stage: Any) -> None:
     assert seen[19] == (0, 193, 4)
 
 
-def test_a_cut_link_is_silent_and_deaf_and_comes_back(stage: Any) -> None:
+def test_a_cut_link_neither_sends_nor_receives_until_it_is_restored(stage: Any) -> None:
     at = stage(ardurover.LINK_SILENCE)
     at.play(8.05)
     at.listener.command(at.autopilot, ARM_DISARM, 0)
@@ -227,7 +234,7 @@ def test_a_cut_link_is_silent_and_deaf_and_comes_back(stage: Any) -> None:
 
 def test_a_reboot_restarts_times_and_sequence_and_forgets_requests(stage: Any) -> None:
     at = stage(ardurover.REBOOT)
-    at.ask(SET_MESSAGE_INTERVAL, 2, 500_000)
+    at.command(SET_MESSAGE_INTERVAL, 2, 500_000)
     before = at.play(7.9)
     assert before[-1].get_seq() > 15
     assert [m.time_boot_ms for m in before if m.get_type() == "SYSTEM_TIME"][-1] > 7000
@@ -237,29 +244,29 @@ def test_a_reboot_restarts_times_and_sequence_and_forgets_requests(stage: Any) -
     assert (first.get_type(), first.get_seq()) == ("HEARTBEAT", 0)
     assert (first.custom_mode, first.system_status, first.base_mode) == (16, 2, 65)
     assert kinds(rest) == {"HEARTBEAT"}
-    at.ask(SET_MESSAGE_INTERVAL, 2, 500_000)
+    at.command(SET_MESSAGE_INTERVAL, 2, 500_000)
     assert 9_000 < at.play(1.0, "SYSTEM_TIME")[0].time_boot_ms < 12_000
     assert at.autopilot.state == ardurover.READY.start
 
 
-def test_system_time_carries_the_clock_that_it_was_polled_with(stage: Any) -> None:
+def test_system_time_has_the_time_of_the_poll(stage: Any) -> None:
     at = stage(DEMO)
     (*_, message) = at.play(7.0, "SYSTEM_TIME")
     assert at.clock.now().unix_us - 1_000_000 < message.time_unix_usec <= at.clock.now().unix_us
 
 
 @pytest.mark.parametrize("scenario", BY_NAME.values(), ids=BY_NAME)
-def test_every_scenario_can_be_played_to_its_end(stage: Any, scenario: Scenario) -> None:
+def test_every_scenario_runs_to_its_end(stage: Any, scenario: Scenario) -> None:
     at = stage(scenario, speed=4.0)
-    heard = at.play(scenario.duration / 4 + 4.0)  # a reboot adds its boot
+    received = at.play(scenario.duration / 4 + 4.0)  # a reboot adds its boot
     assert at.autopilot.finished
-    assert "HEARTBEAT" in kinds(heard)
+    assert "HEARTBEAT" in kinds(received)
 
 
-def test_the_demo_says_what_a_gateway_needs_for_its_story(stage: Any) -> None:
+def test_the_demo_sends_the_messages_that_a_gateway_needs(stage: Any) -> None:
     at = stage(DEMO)
-    heard = at.play(DEMO.duration + 1.0)
-    assert texts(heard) == [
+    received = at.play(DEMO.duration + 1.0)
+    assert texts(received) == [
         "Beginning INS calibration. Do not move vehicle",
         "ArduPilot Ready",
         "AHRS: DCM active",
@@ -275,25 +282,25 @@ def test_the_demo_says_what_a_gateway_needs_for_its_story(stage: Any) -> None:
         "Crash: Going to HOLD",
         "Throttle disarmed",
     ]
-    assert all(m.onboard_control_sensors_present & 1 << 15 for m in heard if m.get_type() == "SYS_STATUS")
+    assert all(m.onboard_control_sensors_present & 1 << 15 for m in received if m.get_type() == "SYS_STATUS")
     assert at.play(3.0) == []
 
 
-# Scripted from outside
+# Changes by a test
 
 
-def test_a_test_can_take_the_vehicle_into_its_hands(stage: Any) -> None:
+def test_a_test_can_change_the_vehicle(stage: Any) -> None:
     at = stage(ardurover.READY)
-    at.ask(SET_MESSAGE_INTERVAL, 30, 1e6)
+    at.command(SET_MESSAGE_INTERVAL, 30, 1e6)
     at.autopilot.arm()
     at.autopilot.set_mode(77)
     at.autopilot.say(4, "EKF variance")
     at.autopilot.set(rates=(0.0, 0.0, 0.5))
-    heard = at.play(1.1)
-    heartbeat = [m for m in heard if m.get_type() == "HEARTBEAT"][-1]
+    received = at.play(1.1)
+    heartbeat = [m for m in received if m.get_type() == "HEARTBEAT"][-1]
     assert (heartbeat.custom_mode, heartbeat.base_mode) == (77, 129)
-    assert texts(heard) == ["Throttle armed", "EKF variance"]
-    assert [round(m.yawspeed, 2) for m in heard if m.get_type() == "ATTITUDE"] == [0.5]
+    assert texts(received) == ["Throttle armed", "EKF variance"]
+    assert [round(m.yawspeed, 2) for m in received if m.get_type() == "ATTITUDE"] == [0.5]
     at.autopilot.silence()
     assert at.play(3.0) == []
     at.autopilot.resume()
@@ -305,12 +312,12 @@ def test_a_test_can_take_the_vehicle_into_its_hands(stage: Any) -> None:
     assert at.play(0.2)[0].custom_mode == 16
 
 
-def test_a_misspelt_field_is_an_error_where_it_is_written(stage: Any) -> None:
+def test_a_misspelt_field_is_an_error_at_the_call(stage: Any) -> None:
     with pytest.raises((TypeError, ValueError), match="spede"):
         stage(ardurover.READY).autopilot.set(spede=3)
 
 
-def test_it_remembers_what_it_heard(stage: Any) -> None:
+def test_it_returns_the_messages_that_it_received(stage: Any) -> None:
     at = stage(ardurover.READY)
     at.listener.ground_station_heartbeat(at.autopilot)
     at.listener.command(at.autopilot, SET_MESSAGE_INTERVAL, 1, 1e6)
@@ -319,7 +326,7 @@ def test_it_remembers_what_it_heard(stage: Any) -> None:
     assert [m.param1 for m in at.autopilot.heard("COMMAND_LONG")] == [1.0]
 
 
-def test_what_it_remembers_is_bounded(stage: Any) -> None:
+def test_the_list_of_received_messages_is_bounded(stage: Any) -> None:
     at = stage(ardurover.READY)
     for _ in range(12):
         for _ in range(100):
@@ -328,14 +335,14 @@ def test_what_it_remembers_is_bounded(stage: Any) -> None:
     assert len(at.autopilot.heard()) == 1000
 
 
-def test_without_an_address_it_answers_whoever_speaks(stage: Any) -> None:
+def test_without_an_address_it_answers_the_latest_sender(stage: Any) -> None:
     at = stage(ardurover.READY, to=None)
     assert at.play(2.0) == []
     at.listener.ground_station_heartbeat(at.autopilot)
     assert kinds(at.play(2.0)) == {"HEARTBEAT"}
 
 
-def test_garbage_does_not_disturb_it(stage: Any) -> None:
+def test_garbage_has_no_effect(stage: Any) -> None:
     at = stage(ardurover.READY)
     chance = random.Random(1)
     frame = at.listener.mav.command_long_encode(1, 1, ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0).pack(at.listener.mav)
@@ -353,22 +360,22 @@ def test_garbage_does_not_disturb_it(stage: Any) -> None:
     assert at.autopilot.state.armed
 
 
-def test_a_gateway_that_is_not_there_does_not_disturb_it(stage: Any) -> None:
+def test_a_missing_gateway_has_no_effect(stage: Any) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as gone:
         gone.bind(("127.0.0.1", 0))
         address = gone.getsockname()
     stage(DEMO, to=address).play(5.0)
 
 
-def test_a_port_that_is_taken_is_an_error_and_leaves_nothing_open(listener: Any) -> None:
+def test_a_port_in_use_is_an_error_and_leaves_nothing_open(listener: Any) -> None:
     with pytest.raises(OSError, match="in use"):
         FakeAutopilot(ardurover.READY, bind=listener.address)
 
 
-# With a thread of its own
+# In a thread
 
 
-def test_in_a_thread_it_runs_by_itself_and_stops_cleanly(listener: Any) -> None:
+def test_it_runs_in_a_thread_and_stops_cleanly(listener: Any) -> None:
     listener.socket.settimeout(5.0)
     threads = threading.active_count()
     notes: list[Step] = []

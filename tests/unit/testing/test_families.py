@@ -1,4 +1,4 @@
-"""The status of the vehicles of which there is no recording with known truth, each in its own story.
+"""The status of the vehicles without a recording with known truth, each in a scenario.
 
 A line is: mode | e_stopped, drives_powered, motion_possible, in_motion, in_error | error_code; ? is unknown.
 """
@@ -9,13 +9,8 @@ from typing import Any
 
 import pytest
 
-from mav_robot_status.hardware.options import HardwareOptions
+from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.interface import RobotMode
-from mav_robot_status.mavlink.pymavlink_dialect import (
-    MAVLink_command_ack_message,
-    MAVLink_command_long_message,
-    MAVLink_event_message,
-)
 from mav_robot_status.testing import (
     BY_NAME,
     arduboat,
@@ -33,6 +28,11 @@ from mav_robot_status.testing import other_firmwares as rows
 from mav_robot_status.testing.firmware import Firmware, base_mode, not_armable, sensors, system_status
 from mav_robot_status.testing.messages import available_modes
 from mav_robot_status.testing.scenarios import MODULES
+from tests.pymavlink_dialect import (
+    MAVLink_command_ack_message,
+    MAVLink_command_long_message,
+    MAVLink_event_message,
+)
 
 from .screening import Screening
 
@@ -72,7 +72,7 @@ SAID: list[tuple[str, Firmware, dict[str, Any], int, int]] = [
 
 
 @pytest.mark.parametrize("row", SAID, ids=[row[0] for row in SAID])
-def test_a_state_is_said_as_real_firmware_says_it(row: tuple[str, Firmware, dict[str, Any], int, int]) -> None:
+def test_a_state_is_reported_as_by_real_firmware(row: tuple[str, Firmware, dict[str, Any], int, int]) -> None:
     _, firmware, changes, expected_base_mode, expected_status = row
     state = firmware.ready._replace(**changes)
     assert (base_mode(firmware, state), system_status(firmware, state)) == (expected_base_mode, expected_status)
@@ -88,27 +88,27 @@ def test_a_state_is_said_as_real_firmware_says_it(row: tuple[str, Firmware, dict
     ],
     ids=lambda value: value.name if isinstance(value, Firmware) else "",
 )
-def test_only_an_autopilot_that_has_it_tells_of_its_prearm_checks(firmware: Firmware, masks: Any) -> None:
+def test_only_an_autopilot_with_prearm_checks_reports_them(firmware: Firmware, masks: Any) -> None:
     assert sensors(firmware, firmware.ready, prearm_ok=True) == masks
 
 
 def test_available_modes_are_listed_all_or_one_by_one() -> None:
-    everything = [m.to_dict() for m in available_modes(rows.BETAFLIGHT, 0)]
-    assert [m["mode_name"] for m in everything][:3] == ["Acro", "Angle", "Horizon"]
+    everything = [m._asdict() for m in available_modes(rows.BETAFLIGHT, 0)]
+    assert [m["mode_name"] for m in everything][:3] == [b"Acro", b"Angle", b"Horizon"]
     assert {m["number_modes"] for m in everything} == {len(everything)} == {8}
-    assert [m.to_dict() for m in available_modes(rows.BETAFLIGHT, 4)] == [everything[3]]
+    assert [m._asdict() for m in available_modes(rows.BETAFLIGHT, 4)] == [everything[3]]
     assert everything[3]["mode_index"] == 4
     assert available_modes(rows.BETAFLIGHT, 9) == available_modes(rows.ARDUSUB, 0) == []
 
 
-def test_every_family_has_a_vehicle_to_which_nothing_happens() -> None:
+def test_every_family_has_a_scenario_without_steps() -> None:
     assert all(f"{module.__name__.rpartition('.')[2]}/ready" in BY_NAME for module in MODULES)
 
 
 # -- ArduPilot Plane ---------------------------------------------------------------------------------------------------
 
 
-def test_a_plane_that_initialises_is_nobodys_and_cannot_move() -> None:
+def test_an_initialising_plane_has_no_mode_and_cannot_move() -> None:
     boot = Screening(arduplane.BOOT)
     assert boot.at(0.5) == "? | ? F F ? ? | 0"
     assert {"DISARMED", "INITIALISING", "SYS_STATUS_MISSING"} == boot.inhibits.keys()
@@ -165,7 +165,7 @@ def test_a_terminated_plane_is_stopped_until_it_reboots() -> None:
     assert flight.at(40.0) == "MANUAL | F F F F F | 0"
 
 
-def test_missing_terrain_data_are_no_fault_of_a_good_flight() -> None:
+def test_missing_terrain_data_are_not_an_error() -> None:
     assert Screening(arduplane.NO_TERRAIN_DATA).at(14.0) == "AUTO | ? T T T F | 0"
 
 
@@ -214,7 +214,7 @@ def test_a_dive() -> None:
     assert dive.at(35.0) == "MANUAL | F F F F F | 0"
 
 
-def test_a_leak_is_an_error_until_it_was_not_told_for_45_seconds() -> None:
+def test_a_leak_is_an_error_until_45_seconds_after_the_last_text() -> None:
     dive = Screening(ardusub.LEAK)
     assert dive.at(15.0) == "AUTO | ? T T T T | 2010"
     assert dive.detail.vehicle.state == "ACTIVE"
@@ -223,7 +223,7 @@ def test_a_leak_is_an_error_until_it_was_not_told_for_45_seconds() -> None:
     assert dive.at(97.1) == "MANUAL | ? T T F F | 0"
 
 
-def test_a_lost_joystick_is_an_error_until_the_state_is_calm() -> None:
+def test_a_lost_joystick_is_an_error_until_the_state_is_normal() -> None:
     dive = Screening(ardusub.PILOT_LOST)
     assert dive.at(12.1) == "MANUAL | ? T T F T | 2001"
     assert dive.at(19.9) == "MANUAL | ? T T F T | 2001"
@@ -250,7 +250,7 @@ def test_a_boat_moves_when_it_drifts_and_not_when_it_is_rolled() -> None:
     assert boat.at(28.0) == "AUTO | F F F T F | 0"
 
 
-def test_a_lost_ground_station_of_a_boat_is_what_the_boat_calls_it() -> None:
+def test_a_lost_ground_station_of_a_boat_is_the_failsafe_that_the_boat_reports() -> None:
     boat = Screening(arduboat.GCS_FAILSAFE)
     assert boat.at(8.5) == "AUTO | ? T T T F | 0"
     assert boat.at(12.0) == "AUTO | ? T T F T | 2001"
@@ -282,7 +282,7 @@ def test_the_safety_switch_of_a_tracker_is_a_stop() -> None:
     assert antenna.status.error_code == 0
 
 
-def test_a_blimp_by_hand_and_by_itself() -> None:
+def test_a_blimp_in_manual_and_in_automatic_modes() -> None:
     flight = Screening(blimp.FLIGHT)
     assert flight.at(5.5) == "MANUAL | ? T T F F | 0"
     assert flight.at(11.0) == "MANUAL | ? T T T F | 0"
@@ -293,14 +293,14 @@ def test_a_blimp_by_hand_and_by_itself() -> None:
     assert flight.at(26.0) == "AUTO | F F F F F | 0"
 
 
-def test_a_blimp_without_radio_lands_by_itself() -> None:
+def test_a_blimp_without_radio_lands() -> None:
     flight = Screening(blimp.RC_FAILSAFE)
     assert flight.at(8.5) == "MANUAL | ? T T T F | 0"
     assert flight.at(12.0) == "AUTO | ? T T T T | 2001"
     assert flight.at(17.0) == "AUTO | ? T T T F | 0"
 
 
-def test_a_user_can_say_what_a_mode_is() -> None:
+def test_a_user_can_declare_the_class_of_a_mode() -> None:
     """An old Blimp has MANUAL and LAND the other way round."""
     overrides = {"blimp": {0: RobotMode.MANUAL, 1: RobotMode.AUTO}, "plane": {12: RobotMode.MANUAL}}
     options = HardwareOptions(mode_overrides=overrides)  # type: ignore[arg-type]
@@ -314,7 +314,7 @@ def test_a_user_can_say_what_a_mode_is() -> None:
 # -- PX4 ---------------------------------------------------------------------------------------------------------------
 
 
-def test_a_vtol_of_px4_there_and_back() -> None:
+def test_a_px4_vtol_on_its_wings_and_on_its_rotors() -> None:
     flight = Screening(px4_vtol.TRANSITION)
     assert flight.at(2.5) == "MANUAL | F F F F F | 0"
     assert flight.at(4.5) == "AUTO | F T T F F | 0"
@@ -340,10 +340,10 @@ def event(log_levels: int, sequence: int) -> MAVLink_event_message:
 def test_an_event_is_an_error_for_ten_seconds_unless_it_answers_the_operator() -> None:
     flight = Screening(px4.MANUAL)
     flight.at(2.5)
-    assert flight.say(event(0x42, 1)) == "MANUAL | F F F F F | 0"  # disarmed: readiness
+    assert flight.receive(event(0x42, 1)) == "MANUAL | F F F F F | 0"  # disarmed: readiness
     flight.at(9.0)
-    assert flight.say(event(0x62, 2)) == "MANUAL | F T T T F | 0"
-    assert flight.say(event(0x42, 3)) == "MANUAL | F T T T T | 7002"
+    assert flight.receive(event(0x62, 2)) == "MANUAL | F T T T F | 0"
+    assert flight.receive(event(0x42, 3)) == "MANUAL | F T T T T | 7002"
     assert flight.at(18.9).endswith("T | 7002")
     assert flight.at(19.1).endswith("F | 0")
 
@@ -353,7 +353,7 @@ def test_an_event_is_an_error_for_ten_seconds_unless_it_answers_the_operator() -
 
 def test_a_rover_of_inav_counts_its_modes_as_a_plane() -> None:
     drive = Screening(inav.DRIVE)
-    assert drive.at(2.5) == "MANUAL | ? F F ? F | 0"  # its zero speed is none
+    assert drive.at(2.5) == "MANUAL | ? F F ? F | 0"  # a speed of zero means unknown
     assert drive.at(7.5) == "MANUAL | ? T T T F | 0"
     assert drive.flight_mode == "ACRO"
     assert drive.at(10.5) == "MANUAL | ? T T T F | 0"
@@ -390,7 +390,7 @@ def test_a_quad_of_inav_returns_home_without_remote_control() -> None:
 def test_a_betaflight_flown_by_hand() -> None:
     flight = Screening(betaflight.MANUAL)
     assert flight.at(2.5) == "MANUAL | ? F F F F | 0"
-    assert flight.flight_mode is None  # base_mode says that there is no custom mode
+    assert flight.flight_mode is None  # base_mode has no CUSTOM_MODE flag
     assert flight.at(5.0) == "MANUAL | ? T T ? F | 0"  # at rest, or in the air? It has no landed state
     assert flight.flight_mode == "Acro"
     assert flight.at(9.0) == "MANUAL | ? T T T F | 0"
@@ -409,7 +409,7 @@ def test_the_standard_modes_that_a_betaflight_lists_win_over_its_base_mode() -> 
     assert flight.vehicle.handle.evidence["mode"].rule == "AVAILABLE_MODES.standard_mode SAFE_RECOVERY"
 
 
-def test_without_its_modes_a_betaflight_is_misread() -> None:
+def test_without_its_modes_a_betaflight_has_the_mode_of_its_base_mode() -> None:
     silent = betaflight.AUTOPILOT._replace(firmware=betaflight.AUTOPILOT.firmware._replace(modes=()))
     flight = Screening(silent)
     assert flight.at(10.0) == "MANUAL | ? T T T F | 0"
@@ -419,7 +419,7 @@ def test_without_its_modes_a_betaflight_is_misread() -> None:
 def test_the_current_mode_counts_while_it_is_fresh_and_of_this_mode() -> None:
     flight = Screening(betaflight.AUTOPILOT)
     flight.at(7.0)
-    flight.ask(512, 436)
+    flight.command(512, 436)
     assert flight.at(7.1) == "AUTO | ? T T T F | 0"
     assert flight.vehicle.handle.evidence["mode"].rule == "CURRENT_MODE.standard_mode MISSION"
     flight.at(11.6)
@@ -433,9 +433,9 @@ def test_the_failsafe_of_a_betaflight_disarms_it() -> None:
     assert flight.at(14.0) == "MANUAL | ? F F F F | 0"
 
 
-# -- commands that others give -----------------------------------------------------------------------------------------
+# -- commands of other peers  -----------------------------------------------------------------------------------------
 
-STATION = (255, 190)
+GROUND_STATION = (255, 190)
 LOW, HIGH = 0.0, 2.0
 
 
@@ -445,12 +445,12 @@ def aux_function(position: float) -> MAVLink_command_long_message:
 
 
 def test_a_stop_that_a_ground_station_commands_is_known_when_the_plane_has_accepted_it() -> None:
-    accepted = MAVLink_command_ack_message(218, 0, 0, 0, *STATION)
+    accepted = MAVLink_command_ack_message(218, 0, 0, 0, *GROUND_STATION)
     flight = Screening(arduplane.AUTO)
     assert flight.at(14.0) == "AUTO | ? T T T F | 0"
-    assert flight.say(aux_function(HIGH), STATION) == "AUTO | ? T T T F | 0"
-    assert flight.say(accepted) == "AUTO | T F F T F | 0"
+    assert flight.receive(aux_function(HIGH), GROUND_STATION) == "AUTO | ? T T T F | 0"
+    assert flight.receive(accepted) == "AUTO | T F F T F | 0"
     assert {"E_STOPPED"} == flight.inhibits.keys()
     assert flight.at(17.0) == "AUTO | T F F T F | 0"
-    flight.say(aux_function(LOW), STATION)
-    assert flight.say(accepted) == "AUTO | F T T T F | 0"
+    flight.receive(aux_function(LOW), GROUND_STATION)
+    assert flight.receive(accepted) == "AUTO | F T T T F | 0"

@@ -1,4 +1,4 @@
-"""What real firmware was seen to send in the same situation: rows of the project's truth table."""
+"""The messages of real firmware in the same situation, as rows of the project's truth table."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ SEEN: list[tuple[str, Firmware, dict[str, Any], int, int, tuple[int, int, int]]]
 
 
 @pytest.mark.parametrize("row", SEEN, ids=[row[0] for row in SEEN])
-def test_a_state_is_said_as_real_firmware_says_it(row: tuple[str, Firmware, dict[str, Any], int, int, Any]) -> None:
+def test_a_state_is_reported_as_by_real_firmware(row: tuple[str, Firmware, dict[str, Any], int, int, Any]) -> None:
     _, firmware, changes, expected_base_mode, expected_status, masks = row
     state = firmware.ready._replace(**changes)
     assert base_mode(firmware, state) == expected_base_mode
@@ -51,7 +51,7 @@ def test_a_state_is_said_as_real_firmware_says_it(row: tuple[str, Firmware, dict
     assert sensors(firmware, state, prearm_ok=not not_armable(state)) == masks
 
 
-def test_what_a_test_sets_itself_goes_before_what_follows() -> None:
+def test_a_field_that_a_test_sets_overrides_the_computed_value() -> None:
     state = ARDUROVER.ready._replace(base_mode=220, system_status=6, armed=True)
     assert base_mode(ARDUROVER, state) == 220
     assert system_status(ARDUROVER, state) == 6

@@ -1,4 +1,4 @@
-"""Vehicles for a table: what a board holds of them, and a screen's state made of that."""
+"""Vehicles for a table: a board with their statuses, and the state of a screen that shows it."""
 
 from __future__ import annotations
 
@@ -23,15 +23,29 @@ from mav_robot_status.views.terminal.text import Line, plain
 START = Instant(1000.0, 1_800_000_000_000_000)  # 2027-01-15T08:00:00Z
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 ROVER = Vehicle("ARDUPILOTMEGA", "GROUND_ROVER", "HOLD", 4, "ACTIVE")
-DISARMED = Inhibit(1, "DISARMED", None, START.unix_us - 12_000_000)
-PREARM = Inhibit(4, "PREARM_FAILING", "PreArm: GPS 1: Bad fix", START.unix_us - 10_000_000)
+DISARMED = Inhibit("DISARMED", None, START.unix_us - 12_000_000)
+PREARM = Inhibit("PREARM_FAILING", "PreArm: GPS 1: Bad fix", START.unix_us - 10_000_000)
 RADIO = ErrorCause(2001, "RC_LOST", "Radio Failsafe", START.unix_us - 3_000_000)
 CRASH = ErrorCause(4001, "CRASH", None, START.unix_us - 3_000_000)
 
-DRIVING = RobotStatus(RobotMode.AUTO, FALSE, TRUE, TRUE, TRUE, FALSE)
-PARKED = RobotStatus(RobotMode.MANUAL, FALSE, FALSE, FALSE, FALSE, FALSE)
-STOPPED = RobotStatus(RobotMode.AUTO, TRUE, FALSE, FALSE, FALSE, FALSE)
-FAILED = RobotStatus(RobotMode.AUTO, UNKNOWN, TRUE, TRUE, FALSE, TRUE, 2001)
+DRIVING = RobotStatus(
+    mode=RobotMode.AUTO, e_stopped=FALSE, drives_powered=TRUE, motion_possible=TRUE, in_motion=TRUE, in_error=FALSE
+)
+PARKED = RobotStatus(
+    mode=RobotMode.MANUAL, e_stopped=FALSE, drives_powered=FALSE, motion_possible=FALSE, in_motion=FALSE, in_error=FALSE
+)
+STOPPED = RobotStatus(
+    mode=RobotMode.AUTO, e_stopped=TRUE, drives_powered=FALSE, motion_possible=FALSE, in_motion=FALSE, in_error=FALSE
+)
+FAILED = RobotStatus(
+    mode=RobotMode.AUTO,
+    e_stopped=UNKNOWN,
+    drives_powered=TRUE,
+    motion_possible=TRUE,
+    in_motion=FALSE,
+    in_error=TRUE,
+    error_code=2001,
+)
 NOTHING = RobotStatus()
 
 
@@ -46,15 +60,15 @@ def put(
     age: float | None = 0.3,
     **detail: Any,
 ) -> None:
-    """A status comes to a board."""
-    told = Detail(system, component, **{"vehicle": ROVER, **detail})
+    """Put a status on a board."""
+    details = Detail(system, component, **{"vehicle": ROVER, **detail})
     name = handle or f"vehicle/{system}"
-    board.take(RobotStatusMsg(name, at.unix_us, status, told, age), at.mono)
+    board.update(RobotStatusMsg(name, at.unix_us, status, details, age), at.mono)
 
 
 def lose(board: Board, system: int, at: Instant = START, age: float = 5.0) -> None:
     """The link to a vehicle is lost."""
-    stale = Inhibit(0, "LINK_STALE", None, at.unix_us)
+    stale = Inhibit("LINK_STALE", None, at.unix_us)
     quiet = Vehicle("ARDUPILOTMEGA", "GROUND_ROVER")
     put(board, NOTHING, at, system=system, age=age, link=LinkState.LOST, inhibits=(stale,), vehicle=quiet)
 
@@ -73,5 +87,5 @@ def one(**more: Any) -> state.State:
 
 
 def texts(lines: list[Line]) -> list[str]:
-    """What is to be read."""
+    """The visible text of each line."""
     return [plain(line).rstrip() for line in lines]

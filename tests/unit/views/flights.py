@@ -1,4 +1,4 @@
-"""A flight told in steps: what a handle says at a second, as a timeline."""
+"""A flight in steps: the status of a handle at each second, as a timeline."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mav_robot_status.views.timeline import Timeline, TimelineBuilder, VehicleTi
 START_US = 1_800_000_000_000_000  # 2027-01-15T08:00:00Z
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 S = 1_000_000
-DISARMED = Inhibit(1, "DISARMED", None, START_US)
+DISARMED = Inhibit("DISARMED", None, START_US)
 
 
 def error(code: int, name: str, text: str | None = None) -> ErrorCause:
@@ -28,7 +28,7 @@ def error(code: int, name: str, text: str | None = None) -> ErrorCause:
 
 
 class Flight:
-    """One vehicle that is watched. Steps are in seconds on a clock that begins at 100."""
+    """One vehicle in a log. Steps are in seconds on a clock that begins at 100."""
 
     def __init__(self, name: str = "flight.tlog", system: int = 1) -> None:
         self.builder = TimelineBuilder(name)
@@ -51,7 +51,7 @@ class Flight:
         because: Evidence | None = None,
         **fields: TriState,
     ) -> Flight:
-        """A status of a vehicle that is heard."""
+        """A status of a connected vehicle."""
         status = RobotStatus(mode=RobotMode.MANUAL, **fields)
         vehicle = self.detail.vehicle._replace(flight_mode=mode)
         inhibits = inhibits if armed else (DISARMED, *inhibits)
@@ -62,7 +62,7 @@ class Flight:
     def lose(self, second: float) -> Flight:
         """The link is lost."""
         vehicle = self.detail.vehicle._replace(flight_mode=None)
-        stale = Inhibit(0, "LINK_STALE", None, START_US)
+        stale = Inhibit("LINK_STALE", None, START_US)
         return self.put(
             second, RobotStatus(), self.detail._replace(link=LinkState.LOST, inhibits=(stale,), vehicle=vehicle), None
         )
@@ -70,7 +70,7 @@ class Flight:
     def put(self, second: float, status: RobotStatus, detail: Detail, because: Evidence | None) -> Flight:
         self.handle.status, self.handle.detail = status, detail
         self.handle.evidence = {} if because is None else dict.fromkeys(RobotStatus._fields[:-1], because)
-        self.builder.look([self.handle], self.instant(second))
+        self.builder.sample([self.handle], self.instant(second))
         return self
 
     def jump(self, second: float, by_us: int) -> Flight:

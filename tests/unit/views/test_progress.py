@@ -10,7 +10,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_where_there_is_no_terminal_nothing_is_said() -> None:
+def test_without_a_terminal_nothing_is_written() -> None:
     stream = io.StringIO()
     line = ProgressLine(stream, "reading a.tlog")
     line(0.5)
@@ -18,7 +18,7 @@ def test_where_there_is_no_terminal_nothing_is_said() -> None:
     assert stream.getvalue() == ""
 
 
-def test_the_bar_grows_and_is_taken_away() -> None:
+def test_the_bar_grows_and_is_removed() -> None:
     terminal = Terminal()
     line = ProgressLine(terminal, "reading a.tlog")
     line(0.5)
@@ -27,7 +27,7 @@ def test_the_bar_grows_and_is_taken_away() -> None:
     assert terminal.getvalue().endswith(f"\r{ERASE}")
 
 
-def test_it_is_drawn_once_for_each_per_cent() -> None:
+def test_the_bar_is_drawn_once_for_each_per_cent() -> None:
     terminal = Terminal()
     line = ProgressLine(terminal, "")
     for step in range(10_001):
@@ -35,7 +35,7 @@ def test_it_is_drawn_once_for_each_per_cent() -> None:
     assert terminal.getvalue().count("%") == 101
 
 
-def test_a_hostile_name_cannot_steer_the_terminal() -> None:
+def test_control_characters_in_a_name_are_replaced() -> None:
     terminal = Terminal()
     ProgressLine(terminal, "a\033[2J\n.tlog")(0.0)
     assert terminal.getvalue().startswith("a?[2J?.tlog")

@@ -20,16 +20,16 @@ def test_keys_have_actions() -> None:
     assert typed(b"jke\x1b[A\x1bOB?q") == ["down", "up", "explain", "up", "down", "help", "end"]
 
 
-def test_a_key_without_a_meaning_is_passed_over() -> None:
+def test_a_key_without_an_action_is_ignored() -> None:
     assert typed(b"xe\x1b[1;5Aj\x1b[999zk\xc3\xa4") == ["explain", "down", "up"]
 
 
-def test_a_sequence_that_comes_in_pieces_is_put_together() -> None:
+def test_a_sequence_may_arrive_in_pieces() -> None:
     keyboard = Keyboard()
     assert [keyboard.feed(bytes([byte])) for byte in b"\x1b[6~"] == [[], [], [], ["page down"]]
 
 
-def test_a_lone_escape_is_known_by_what_does_not_follow() -> None:
+def test_an_escape_without_further_bytes_is_the_escape_key() -> None:
     keyboard = Keyboard()
     assert keyboard.feed(b"\x1b") == []
     assert keyboard.waiting
@@ -39,7 +39,7 @@ def test_a_lone_escape_is_known_by_what_does_not_follow() -> None:
 
 @settings(deadline=None)
 @given(st.binary())
-def test_whatever_is_typed_ends_in_known_actions(data: bytes) -> None:
+def test_any_input_gives_known_actions_only(data: bytes) -> None:
     assert set(typed(data)) <= set(ACTIONS.values())
 
 
@@ -54,11 +54,11 @@ def fleet(count: int = 5, chosen: int = 1) -> State:
     ("action", "chosen"),
     [("down", 4), ("up", 2), ("first", 1), ("last", 5), ("page down", 5), ("page up", 1), ("redraw", 3)],
 )
-def test_keys_choose_a_vehicle_and_stop_at_the_ends(action: str, chosen: int) -> None:
+def test_keys_select_a_vehicle_and_stop_at_the_ends(action: str, chosen: int) -> None:
     assert press(fleet(chosen=3), action, rows=3, page=5).ui.handle == f"vehicle/{chosen}"
 
 
-def test_n_goes_round_the_vehicles_with_something_wrong() -> None:
+def test_n_cycles_through_the_vehicles_with_a_problem() -> None:
     board = Board()
     for system in range(1, 7):
         put(board, system=system)
@@ -74,7 +74,7 @@ def test_n_goes_round_the_vehicles_with_something_wrong() -> None:
     assert press(fleet(chosen=3), "problem", 3, 5).ui.handle == "vehicle/3"
 
 
-def test_a_pane_opens_with_its_key_and_closes_with_it_or_with_escape() -> None:
+def test_a_pane_opens_with_its_key_and_closes_with_the_same_key_or_escape() -> None:
     state = press(fleet(), "explain", 3, 5)
     assert state.ui.pane == "explain"
     assert press(state, "transitions", 3, 5).ui.pane == "transitions"
@@ -82,13 +82,13 @@ def test_a_pane_opens_with_its_key_and_closes_with_it_or_with_escape() -> None:
     assert press(state, "back", 3, 5).ui.pane == "detail"
 
 
-def test_another_vehicle_begins_at_the_top_of_its_pane() -> None:
+def test_the_pane_of_another_vehicle_starts_at_the_top() -> None:
     state = fleet()._replace(ui=Ui("vehicle/1", "transitions", scroll=7))
     assert press(state, "down", 3, 5).ui.scroll == 0
     state = fleet()._replace(ui=Ui("vehicle/1", "all transitions", scroll=7))
     assert press(state, "down", 3, 5).ui.scroll == 7
 
 
-def test_without_vehicles_keys_do_no_harm() -> None:
+def test_without_vehicles_keys_change_nothing() -> None:
     for action in set(ACTIONS.values()):
         assert press(screen(Board()), action, 0, 5).ui.handle == ""

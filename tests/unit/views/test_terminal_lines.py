@@ -1,4 +1,4 @@
-"""What is not drawn by `render`: the lines where there is no screen, colours, and the strip of the log."""
+"""The parts of `watch` beside `render`: lines without a screen, colours, and the log strip."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from mav_robot_status.clock import Instant, later
-from mav_robot_status.gateway.watched import Row
+from mav_robot_status.gateway.background import Row
 from mav_robot_status.publishers.board import Board, Transition
 from mav_robot_status.views.terminal import paint
 from mav_robot_status.views.terminal.render import render
@@ -24,23 +24,23 @@ from .fleet import DISARMED, DRIVING, FAILED, PARKED, RADIO, START, one, put
 
 
 class Source:
-    """A source whose waiting is what happens next."""
+    """A source whose `wait` runs the next step of the test."""
 
     connection = "udp:127.0.0.1:14550"
     advice = ""
     explained = ""
 
-    def __init__(self, board: Board, *happenings: Callable[[], object]) -> None:
+    def __init__(self, board: Board, *steps: Callable[[], object]) -> None:
         self._board = board
-        self._happenings = list(happenings)
+        self._steps = list(steps)
 
     def now(self) -> Instant:
         return START
 
     def wait(self, seconds: float) -> bool:
-        if self._happenings:
-            self._happenings.pop(0)()
-        return not self._happenings
+        if self._steps:
+            self._steps.pop(0)()
+        return not self._steps
 
     def explanation(self) -> Mapping[str, Any] | None:
         return None
@@ -77,7 +77,7 @@ def test_without_a_screen_each_change_is_a_line_below_the_titles(pipe: tuple[int
     source = Source(
         board,
         lambda: put(board, PARKED, inhibits=(DISARMED,)),
-        lambda: put(board, PARKED, later(START, 0.5), inhibits=(DISARMED,)),  # the same again
+        lambda: put(board, PARKED, later(START, 0.5), inhibits=(DISARMED,)),  # no change
         lambda: put(board, FAILED, later(START, 1.5), errors=(RADIO,)),
     )
     assert printed(pipe, source) == [
@@ -90,13 +90,13 @@ def test_without_a_screen_each_change_is_a_line_below_the_titles(pipe: tuple[int
     ]
 
 
-def test_lines_without_utf8_have_other_symbols(pipe: tuple[int, int]) -> None:
+def test_lines_without_utf8_have_ascii_symbols(pipe: tuple[int, int]) -> None:
     board = Board()
     lines = printed(pipe, Source(board, lambda: put(board, DRIVING)), ASCII)
     assert lines[-1].endswith("HOLD         AUTO   - no   * YES * YES * YES  - no  0s")
 
 
-def test_a_reader_that_is_too_slow_gets_the_latest(pipe: tuple[int, int]) -> None:
+def test_a_slow_reader_gets_the_latest_status(pipe: tuple[int, int]) -> None:
     board = Board()
     os.set_blocking(pipe[1], False)
     filled = 0
@@ -113,7 +113,7 @@ def test_a_reader_that_is_too_slow_gets_the_latest(pipe: tuple[int, int]) -> Non
     assert "AUTO   ? unk" in lines[2]
 
 
-def test_a_reader_that_has_gone_ends_it_though_nothing_changes(pipe: tuple[int, int]) -> None:
+def test_a_closed_reader_ends_it_without_a_change(pipe: tuple[int, int]) -> None:
     os.close(pipe[0])
     with pytest.raises(BrokenPipeError):
         show_lines(Source(Board(), lambda: None), pipe[1], UNICODE)
@@ -155,7 +155,7 @@ def test_without_rich_the_same_is_plain_text(monkeypatch: pytest.MonkeyPatch) ->
 # -- the log -----------------------------------------------------------------------------------------------------------
 
 
-def test_the_log_is_kept_for_the_strip_and_handed_back() -> None:
+def test_the_strip_receives_the_log_and_then_restores_the_handlers() -> None:
     root = logging.getLogger()
     strip, before = Strip(), root.handlers[:]
     with strip.instead_of_stderr():
@@ -165,7 +165,7 @@ def test_the_log_is_kept_for_the_strip_and_handed_back() -> None:
     assert [(line.text, line.serious) for line in strip.lines] == [("lost vehicle 1.1", True)]
 
 
-def test_a_standard_error_that_is_no_terminal_has_the_log_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_redirected_standard_error_still_has_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
     root, file = logging.getLogger(), io.StringIO()
     monkeypatch.setattr(root, "handlers", [logging.StreamHandler(file)])
     with Strip().instead_of_stderr():

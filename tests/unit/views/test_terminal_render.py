@@ -77,7 +77,7 @@ def test_the_screen_of_80_columns() -> None:
         " handle    vehicle/2",
         *[""] * 10,
         " 08:00:00 lost vehicle 3.1: no heartbeat for 3.5 s",
-        " j/k choose  n next problem  e explain  t changes  ? help  q end",
+        " j/k select  n next problem  e explain  t changes  ? help  q quit",
     ]
 
 
@@ -92,7 +92,7 @@ def test_a_wide_screen_has_the_names_of_the_fields_and_the_texts() -> None:
     ]
 
 
-def test_a_narrow_screen_has_the_fields_nevertheless() -> None:
+def test_a_narrow_screen_still_has_the_fields() -> None:
     board = Board()
     put(board, FAILED, errors=(RADIO,))
     put(board, STOPPED, system=2)
@@ -104,9 +104,9 @@ def test_a_narrow_screen_has_the_fields_nevertheless() -> None:
     ]
 
 
-def test_a_narrow_screen_tells_how_to_get_help_and_out() -> None:
-    assert texts(render(screen(fleet(2), ui=Ui(pane="help")), 40, 12))[-1] == " e explain  t changes  ? help  q end"
-    assert texts(render(screen(fleet(2)), 20, 12))[-1] == " ? help  q end"
+def test_a_narrow_screen_shows_the_keys_for_help_and_quit() -> None:
+    assert texts(render(screen(fleet(2), ui=Ui(pane="help")), 40, 12))[-1] == " e explain  t changes  ? help  q quit"
+    assert texts(render(screen(fleet(2)), 20, 12))[-1] == " ? help  q quit"
 
 
 def test_true_false_and_unknown_differ_in_symbol_word_and_style() -> None:
@@ -115,7 +115,7 @@ def test_true_false_and_unknown_differ_in_symbol_word_and_style() -> None:
         assert set(styles(lines, text)) == {style}
 
 
-def test_an_error_and_an_emergency_stop_look_like_one() -> None:
+def test_an_error_and_an_emergency_stop_have_alarming_styles() -> None:
     assert "alarm" in styles(render(one(status=FAILED), 80, 24), "● YES")
     assert "stop" in styles(render(one(status=STOPPED), 80, 24), "● YES")
     assert "1 e-stop" in texts(render(one(status=STOPPED), 80, 24))[0]
@@ -131,21 +131,21 @@ def test_without_utf8_there_are_other_symbols() -> None:
     assert " x 5s " in lines[4]
 
 
-def test_a_text_that_would_steer_the_terminal_does_not() -> None:
+def test_control_characters_in_a_text_do_not_reach_the_terminal() -> None:
     evil = RADIO._replace(text="\x1b]0;hello\x07\x1b[2J")
     lines = render(one(status=FAILED, errors=(evil,), vehicle=Vehicle("\n", "\x9b1m", "\x1b[31m", 1, "")), 120, 24)
     assert all(plain(line).isprintable() for line in lines)
 
 
-def test_the_errors_come_before_what_forbids_to_move_and_texts_before_bare_names() -> None:
+def test_errors_come_before_inhibits_and_texts_before_bare_names() -> None:
     many = row(one(status=FAILED, errors=(RADIO, CRASH), inhibits=(DISARMED, PREARM)), "1.1", 160)
     assert many.endswith("RC_LOST: Radio Failsafe, CRASH, PREARM_FAILING, DISARMED")
     assert row(one(status=PARKED, inhibits=(DISARMED, PREARM)), "1.1").endswith("PREARM_FAILING +1")
     assert row(one(status=PARKED, inhibits=(DISARMED,)), "1.1").endswith(" DISARMED")
 
 
-def test_a_vehicle_that_was_never_heard_has_a_row() -> None:
-    stale = Inhibit(0, "LINK_STALE", None, START.unix_us)
+def test_a_vehicle_without_a_heartbeat_has_a_row() -> None:
+    stale = Inhibit("LINK_STALE", None, START.unix_us)
     state = one(
         status=NOTHING,
         system=7,
@@ -157,7 +157,7 @@ def test_a_vehicle_that_was_never_heard_has_a_row() -> None:
         vehicle=Vehicle(),
     )
     assert " never LINK_STALE" in row(state, "7 ")
-    assert " link      NEVER_SEEN, never heard" in texts(render(state, 80, 24))
+    assert " link      NEVER_SEEN, no heartbeat yet" in texts(render(state, 80, 24))
 
 
 def test_a_vehicle_without_ids_has_the_name_of_its_handle() -> None:
@@ -165,7 +165,7 @@ def test_a_vehicle_without_ids_has_the_name_of_its_handle() -> None:
     assert row(nobody, "tractor_in_…")
 
 
-def test_a_heartbeat_that_is_long_ago_keeps_its_column() -> None:
+def test_the_age_of_an_old_heartbeat_fits_its_column() -> None:
     board = Board()
     for age in (5, 99, 100, 5999, 6000, 172_800, 1e9):
         lose(board, int(age) % 251, age=age)
@@ -174,7 +174,7 @@ def test_a_heartbeat_that_is_long_ago_keeps_its_column() -> None:
 
 
 @pytest.mark.parametrize("width", [*range(33, 180, 7), *FROM])
-def test_titles_and_cells_stand_in_the_same_columns(width: int) -> None:
+def test_titles_and_cells_are_in_the_same_columns(width: int) -> None:
     size = max(i for i, least in enumerate(FROM) if width >= least)
     widths = [c.widths[size] for c in COLUMNS if c.widths[size]]
     titles, cells_ = (plain(line) for line in render(one(inhibits=(DISARMED,)), width, 40)[2:4])
@@ -195,7 +195,7 @@ def rows_of(state: State, width: int = 80, height: int = 24) -> list[str]:
     ]
 
 
-def test_fifty_vehicles_scroll_with_the_choice() -> None:
+def test_fifty_vehicles_scroll_with_the_selection() -> None:
     state = screen(fleet(50))
     assert rows_of(state) == [f"{n}.1" for n in range(1, 10)]
     assert "rows 1-9 of 50" in "".join(texts(render(state, 80, 24)))
@@ -206,7 +206,7 @@ def test_fifty_vehicles_scroll_with_the_choice() -> None:
     assert row(state, "41.1").startswith("▶41.1")
 
 
-def test_few_vehicles_leave_their_room_to_the_details() -> None:
+def test_few_vehicles_leave_more_room_for_the_details() -> None:
     assert layout(screen(fleet(2)), 80, 24) == (2, 2, 15, 2)
     assert layout(screen(fleet(50)), 80, 24) == (2, 9, 8, 2)
     assert layout(screen(fleet(50)), 40, 12) == (1, 4, 4, 0)
@@ -217,7 +217,7 @@ def test_an_explanation_gets_more_room_than_the_table() -> None:
     assert parts.pane > 4 * parts.rows
 
 
-def test_a_vehicle_that_is_chosen_and_gone_is_chosen_no_more() -> None:
+def test_a_removed_vehicle_is_no_longer_selected() -> None:
     state = settled(screen(fleet(2), ui=Ui("nobody")), 80, 24)
     assert state.ui.handle == "vehicle/1"
 
@@ -244,9 +244,9 @@ def test_every_screen_is_filled_exactly(width: int, height: int, count: int, pan
 # -- the pane ----------------------------------------------------------------------------------------------------------
 
 
-def test_before_a_vehicle_is_heard_it_says_what_to_do() -> None:
+def test_the_advice_is_shown_before_the_first_heartbeat() -> None:
     lines = texts(render(screen(Board(), advice="To find out why: doctor udp:127.0.0.1:14550"), 80, 24))
-    assert " No autopilot is heard yet." in lines
+    assert " No heartbeat of an autopilot yet." in lines
     assert " To find out why: doctor udp:127.0.0.1:14550" in lines
     assert "0 vehicles" in lines[0]
 
@@ -255,12 +255,12 @@ def test_before_a_vehicle_is_heard_it_says_what_to_do() -> None:
     ("status", "sentence"),
     [
         (DRIVING, "It can move and a program is in charge."),
-        (STOPPED, "It cannot move, a program is in charge and an emergency stop is engaged."),
-        (FAILED, "It can move, a program is in charge and something is wrong."),
-        (NOTHING, "Whether it can move is not known and who is in charge is not known."),
+        (STOPPED, "It cannot move, a program is in charge and the emergency stop is engaged."),
+        (FAILED, "It can move, a program is in charge and it has an error."),
+        (NOTHING, "It is unknown whether it can move and it is unknown who is in charge."),
     ],
 )
-def test_the_details_begin_with_a_sentence(status: RobotStatus, sentence: str) -> None:
+def test_the_details_begin_with_the_status_as_a_sentence(status: RobotStatus, sentence: str) -> None:
     assert " " + sentence in texts(render(one(status=status), 100, 24))
 
 
@@ -279,7 +279,7 @@ def test_the_room_below_the_details_shows_the_latest_changes() -> None:
     assert " 07:59:56.0   4s ago  in_motion       ● YES" in lines
 
 
-def test_the_rates_are_added_up_and_listed() -> None:
+def test_the_rates_are_listed_with_their_sum() -> None:
     state = one()
     rates = {"SYS_STATUS": 2.0, "HEARTBEAT": 1.02}
     state = state._replace(vehicles=(state.vehicles[0]._replace(rates=rates),))
@@ -305,16 +305,16 @@ def test_an_explanation_has_value_age_rule_and_source() -> None:
     ]
 
 
-def test_on_a_narrow_screen_the_rule_stands_below_the_field() -> None:
+def test_a_narrow_screen_shows_the_rule_below_the_field() -> None:
     assert "   speed  [GLOBAL_POSITION_INT: 0.02" in explained(40)
 
 
-def test_what_was_never_heard_is_not_explained() -> None:
+def test_a_vehicle_without_a_heartbeat_is_not_explained() -> None:
     state = one(age=None)._replace(ui=Ui(pane="explain"))
-    assert " It was never heard, so there is nothing to explain." in texts(render(state, 80, 24))
+    assert " No heartbeat yet: there is nothing to explain." in texts(render(state, 80, 24))
 
 
-def test_changes_say_what_begins_and_what_ends() -> None:
+def test_changes_show_what_begins_and_what_ends() -> None:
     board = Board()
     put(board, PARKED, inhibits=(DISARMED,))
     put(board, FAILED, later(START, 2.0), errors=(RADIO,), vehicle=ROVER._replace(flight_mode="GUIDED"))
@@ -342,7 +342,7 @@ def test_a_long_pane_is_paged() -> None:
     assert state.ui.scroll == 60 - 2 * page
 
 
-def test_the_help_fits_and_says_what_the_symbols_mean() -> None:
+def test_the_help_fits_and_explains_the_symbols() -> None:
     lines = texts(render(one()._replace(ui=Ui(pane="help")), 80, 24))
-    assert " values    ● YES, ○ no, ? unk: the vehicle does not tell; that never means no" in lines
-    assert any("no safety function" in line for line in lines)
+    assert " values    ● YES, ○ no, ? unk: unknown, which never means no" in lines
+    assert any("not a safety function" in line for line in lines)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from mav_robot_status.views.terminal.text import ASCII, Span, cells, clean, clip, encode, fill, fill_line, plain, wrap
 
 
-def test_what_is_too_long_is_cut_and_marked() -> None:
+def test_a_long_text_is_cut_and_marked() -> None:
     assert clip("PREARM_FAILING", 6) == "PREAR…"
     assert clip("PREARM_FAILING", 6, ASCII) == "PREAR~"
     assert clip("CRASH", 5) == "CRASH"
@@ -20,10 +20,10 @@ def test_what_is_too_long_is_cut_and_marked() -> None:
         ("Radio Failsafe", "Radio Failsafe"),
         ("\x1b[2Jgone\r\n\x07", " [2Jgone   "),
         ("e\u0301te\u0301", "été"),  # NFD, as some file systems write it
-        ("a\u200d\u202eb", "ab"),  # a joiner, and the mark that turns the rest of the line round
+        ("a\u200d\u202eb", "ab"),  # a joiner, and a right-to-left override
     ],
 )
-def test_what_a_peer_wrote_cannot_steer_the_terminal(text: str, seen: str) -> None:
+def test_control_characters_of_a_peer_are_removed(text: str, seen: str) -> None:
     assert clean(text) == seen
 
 
@@ -46,17 +46,17 @@ def test_blanks_at_the_end_are_cut_without_a_mark() -> None:
     assert plain(fill_line([Span("0s"), Span("   ")], 3)) == "0s "
 
 
-def test_text_is_broken_at_its_spaces() -> None:
+def test_text_is_broken_at_spaces() -> None:
     assert list(wrap("armed, not stopped, in a state", 12)) == ["armed, not", "stopped, in", "a state"]
 
 
-def test_a_word_that_is_too_long_is_broken_anywhere() -> None:
+def test_a_long_word_is_broken_anywhere() -> None:
     assert list(wrap("a GLOBAL_POSITION_INT", 9)) == ["a", "GLOBAL_PO", "SITION_IN", "T"]
 
 
 @settings(deadline=None)
 @given(st.text(), st.integers(0, 40))
-def test_whatever_is_written_it_takes_the_cells_that_it_is_given(text: str, width: int) -> None:
+def test_any_text_fills_exactly_the_given_cells(text: str, width: int) -> None:
     known = clean(text)
     assert cells(fill(known, width)) == width
     assert cells(plain(fill_line([Span(known), Span("x", "on")], width))) == width

@@ -15,34 +15,34 @@ def values(spans: list[Span]) -> list[tuple[float, float, str]]:
     return [(span.start / S, span.end / S, span.value) for span in spans]
 
 
-def test_a_value_that_lasts_is_one_interval() -> None:
+def test_a_constant_value_is_one_interval() -> None:
     flight = Flight().say(0, in_motion=FALSE).say(1, in_motion=FALSE, in_error=FALSE).say(2, in_motion=TRUE)
     assert values(flight.vehicle(5).tracks["in_motion"]) == [(0, 2, "FALSE"), (2, 5, "TRUE")]
 
 
-def test_unknown_is_a_value_of_its_own() -> None:
+def test_unknown_is_a_separate_value() -> None:
     flight = Flight().say(0, in_error=FALSE).say(1, in_error=UNKNOWN).say(2, in_error=TRUE)
     assert [value for *_, value in values(flight.vehicle(3).tracks["in_error"])] == ["FALSE", "UNKNOWN", "TRUE"]
 
 
-def test_an_interval_knows_why_it_began() -> None:
+def test_an_interval_has_the_evidence_of_its_start() -> None:
     flight = Flight().say(0, in_error=FALSE, because=Evidence("no cause is active", "SYS_STATUS", 100.0))
     flight.say(1, in_error=FALSE, in_motion=TRUE, because=Evidence("another rule", None, None))
     (span,) = flight.vehicle(2).tracks["in_error"]
     assert (span.rule, span.source) == ("no cause is active", "SYS_STATUS")
 
 
-def test_a_vehicle_that_is_heard_late_begins_when_it_is_heard() -> None:
+def test_the_tracks_of_a_vehicle_begin_with_its_first_heartbeat() -> None:
     vehicle = Flight().say(4, in_motion=FALSE).vehicle(5)
     assert all(spans[0].start == 4 * S for spans in vehicle.tracks.values())
 
 
-def test_what_did_not_last_at_all_was_never_so() -> None:
+def test_an_empty_interval_is_left_out() -> None:
     flight = Flight().say(0, in_motion=FALSE).say(1, in_motion=TRUE).say(1, in_motion=FALSE)
     assert [value for *_, value in values(flight.vehicle(2).tracks["in_motion"])] == ["FALSE", "FALSE"]
 
 
-def test_a_vehicle_is_armed_unless_it_says_disarmed_and_nobody_knows_while_the_link_is_lost() -> None:
+def test_a_vehicle_is_armed_without_the_inhibit_disarmed_and_unknown_on_a_lost_link() -> None:
     flight = Flight().say(0, armed=False).say(1).lose(2).say(3)
     assert values(flight.vehicle(4).tracks["armed"]) == [
         (0, 1, "FALSE"),
@@ -59,7 +59,7 @@ def test_a_lost_vehicle_keeps_its_name_and_has_no_flight_mode() -> None:
     assert values(vehicle.tracks["link"]) == [(0, 2, "CONNECTED"), (2, 3, "LOST")]
 
 
-def test_causes_come_and_go_on_their_own() -> None:
+def test_causes_begin_and_end_independently() -> None:
     gps, rc = error(2008, "GPS"), error(2001, "RC_LOST", "Radio Failsafe")
     flight = Flight().say(0).say(1, errors=(gps,)).say(2, errors=(rc, gps)).say(3, errors=(rc,)).say(4)
     assert flight.vehicle(5).errors == [
@@ -68,10 +68,10 @@ def test_causes_come_and_go_on_their_own() -> None:
     ]
 
 
-def test_a_reason_whose_text_changes_goes_on_as_another_interval() -> None:
+def test_a_new_text_of_a_reason_begins_another_interval() -> None:
     flight = Flight()
     for second, text in ((0, "GPS"), (1, "GPS"), (2, "Compass")):
-        flight.say(second, armed=False, inhibits=(Inhibit(4, "PREARM_FAILING", text, START_US),))
+        flight.say(second, armed=False, inhibits=(Inhibit("PREARM_FAILING", text, START_US),))
     found = [reason for reason in flight.vehicle(3).inhibits if reason.name == "PREARM_FAILING"]
     assert found == [
         Reason(0, 2 * S, "PREARM_FAILING", None, "GPS"),
@@ -79,7 +79,7 @@ def test_a_reason_whose_text_changes_goes_on_as_another_interval() -> None:
     ]
 
 
-def test_nothing_goes_on_across_a_jump_of_the_clock() -> None:
+def test_no_interval_spans_a_jump_of_the_clock() -> None:
     flight = Flight().say(0, in_motion=TRUE, errors=(error(2008, "GPS"),))
     flight.jump(3, -7200 * S).say(4, in_motion=TRUE, errors=(error(2008, "GPS"),))
     timeline = flight.end(6)
@@ -88,7 +88,7 @@ def test_nothing_goes_on_across_a_jump_of_the_clock() -> None:
     assert [(segment.start, segment.end) for segment in timeline.segments] == [(0, 3 * S), (3 * S, 6 * S)]
 
 
-def test_each_segment_has_its_own_place_in_utc() -> None:
+def test_each_segment_has_its_own_start_in_utc() -> None:
     timeline = Flight().say(0).jump(3, 7200 * S).say(4).end(6)
     assert timeline.unix_us(0, 3 * S) == START_US + 3 * S
     assert timeline.unix_us(3 * S, 3 * S) == START_US + 7203 * S
@@ -106,7 +106,7 @@ steps = st.lists(
 
 
 @given(steps)
-def test_intervals_of_a_track_never_overlap_and_fill_each_segment_once_the_vehicle_was_heard(
+def test_intervals_of_a_track_never_overlap_and_leave_no_gap_after_the_first_heartbeat(
     story: list[tuple[int, str, object]],
 ) -> None:
     flight, second = Flight().say(0), 0

@@ -1,11 +1,11 @@
-// The table of all vehicles. Rows stay in place while their cells change, so that a keyboard's focus does.
+// The table of all vehicles. Rows are updated in place, so that keyboard focus is kept.
 
 import { FIELDS, LINK, looks, span } from "./words.js";
-import { chip, make, said, say } from "./make.js";
+import { chip, isolated, make, setText } from "./make.js";
 
 const COLUMNS = ["Vehicle", ...FIELDS.map((field) => field.head), "Why", LINK.head];
 
-/** What a vehicle is called: its handle, or its system id where the handle is the default one. */
+/** The title of a vehicle: its handle, or its system id for a default handle. */
 export function title(line) {
   const handle = String(line.handle ?? "?");
   if (!/^industrial_robot_status_handle(\/\d+\.\d+)?$/.test(handle)) return handle;
@@ -25,7 +25,7 @@ export function causes(line) {
     for (const cause of Array.isArray(line[group]) ? line[group] : []) {
       const code = group === "errors" ? `${cause.code} ` : "";
       const item = make("li", { class: tone }, make("b", {}, code + String(cause.name)));
-      if (cause.text) item.append(" ", said(`“${cause.text}”`));
+      if (cause.text) item.append(" ", isolated(`“${cause.text}”`));
       items.push([item, cause]);
     }
   }
@@ -58,18 +58,18 @@ export class Fleet {
     const errors = vehicles.filter(({ line }) => line.in_error === true).length;
     const lost = vehicles.filter(({ line }) => line.link?.state !== "CONNECTED").length;
     const count = vehicles.length === 1 ? "1 vehicle" : `${vehicles.length} vehicles`;
-    say(document.getElementById("count"), `${count}, ${errors} in error, ${lost} not heard`);
+    setText(document.getElementById("count"), `${count}, ${errors} in error, ${lost} without a link`);
     document.getElementById("count").hidden = vehicles.length === 0;
     document.getElementById("empty").hidden = vehicles.length > 0;
     document.title = `${errors ? `(${errors}!) ` : ""}RobotStatus`;
   }
 
-  /** Renew how long ago each was heard. */
+  /** Update the age of each heartbeat. */
   age(vehicles) {
     for (const vehicle of vehicles) {
       const known = this.rows.get(vehicle.line.handle);
       if (!known) continue;
-      say(known.age, vehicle.line.link?.state === "NEVER_SEEN" ? "" : span(vehicle.heardAge()));
+      setText(known.age, vehicle.line.link?.state === "NEVER_SEEN" ? "" : span(vehicle.currentAge()));
       known.row.classList.toggle("stale", vehicle.stale());
     }
   }
@@ -84,8 +84,8 @@ export class Fleet {
       this.rows.set(line.handle, known);
     }
     known.line = line;
-    say(known.link, title(line));
-    say(known.head.children[1], kind(line));
+    setText(known.link, title(line));
+    setText(known.head.children[1], kind(line));
     known.head.children[2].hidden = title(line) === line.handle;
     const focused = document.activeElement === known.link;
     known.row.replaceChildren(known.head, ...FIELDS.map((field) => this.cell(field, line)), this.why(line), this.link(line, known.age));
@@ -97,7 +97,7 @@ export class Fleet {
   cell(field, line) {
     const look = looks(field, line[field.name]);
     const cell = make("td", { role: "cell", "data-head": field.head }, chip(look));
-    if (field.name === "mode") cell.append(make("small", {}, said(line.vehicle?.flight_mode ?? "")));
+    if (field.name === "mode") cell.append(make("small", {}, isolated(line.vehicle?.flight_mode ?? "")));
     if (field.name === "in_error" && line.in_error === true) cell.append(make("small", {}, String(line.error_code)));
     return cell;
   }

@@ -1,4 +1,4 @@
-// Elements. Whatever comes from a vehicle becomes text, never markup.
+// Creates elements. Text from a vehicle becomes a text node, never markup.
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -7,17 +7,17 @@ export function make(tag, attributes = {}, ...children) {
   return fill(document.createElement(tag), attributes, children);
 }
 
-/** The same for SVG. */
+/** An SVG element with attributes and children. */
 export function draw(tag, attributes = {}, ...children) {
   return fill(document.createElementNS(SVG, tag), attributes, children);
 }
 
-/** Text of a vehicle's: its direction does not spill over. */
-export function said(text) {
+/** Text from a vehicle. Its writing direction does not affect other text. */
+export function isolated(text) {
   return make("bdi", {}, String(text));
 }
 
-/** A shape of the sprite; the word beside it tells the same. */
+/** A shape of the sprite. A word beside it has the same meaning. */
 export function shape(name) {
   return draw("svg", { class: "shape", "aria-hidden": "true" }, draw("use", { href: `#${name}` }));
 }
@@ -27,8 +27,8 @@ export function chip({ shape: name, word, tone }) {
   return make("span", { class: `chip ${tone}` }, shape(name), make("span", {}, word));
 }
 
-/** Set text only where it differs: whoever selects or listens is not disturbed. */
-export function say(element, text) {
+/** Set the text if it differs. This keeps a selection, and screen readers repeat nothing. */
+export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 

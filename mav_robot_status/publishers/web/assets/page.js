@@ -1,31 +1,31 @@
-// The page: what the gateway says, kept here, and shown as the fleet or as one vehicle.
+// The page: it holds the data of the gateway, and shows the fleet or one vehicle.
 
 import { Fleet } from "./fleet.js";
 import { Stream } from "./stream.js";
 import { VehiclePage } from "./vehicle.js";
-import { chip, say } from "./make.js";
+import { chip, setText } from "./make.js";
 import { clock, span } from "./words.js";
 
 const TOKEN = "mav-robot-status token";
 const at = (id) => document.getElementById(id);
 const seconds = () => performance.now() / 1000;
 
-/** The latest of one handle, and when it came. */
+/** The latest status of one handle, and its time of arrival. */
 class Vehicle {
   constructor(line) {
-    this.renew(line);
+    this.setLine(line);
   }
 
-  renew(line) {
+  setLine(line) {
     this.line = line;
-    this.beat(line.stamp, line.link?.heartbeat_age ?? null, 0);
+    this.heartbeat(line.stamp, line.link?.heartbeat_age ?? null, 0);
   }
 
-  beat(stamp, heartbeatAge, age) {
+  heartbeat(stamp, heartbeatAge, age) {
     Object.assign(this, { stamp, heartbeatAge, age, at: seconds() });
   }
 
-  heardAge() {
+  currentAge() {
     return this.heartbeatAge === null ? null : this.heartbeatAge + this.age + seconds() - this.at;
   }
 
@@ -34,7 +34,7 @@ class Vehicle {
   }
 }
 
-const page = { vehicles: new Map(), state: "connecting", heardAt: null, heardStamp: null, standing: null, staleAfter: null };
+const page = { vehicles: new Map(), state: "connecting", receivedAt: null, receivedStamp: null, standing: null, staleAfter: null };
 const fleet = new Fleet();
 const one = new VehiclePage();
 let stream = null;
@@ -44,19 +44,19 @@ const on = {
     const now = seconds();
     if (name === "history") return data.handle === one.handle && (one.take(data, now), render());
     if (name === "explanation") return data.handle === one.handle && one.explain(data);
-    [page.state, page.heardAt, page.heardStamp, page.standing] = ["live", now, data.now, data.standing];
+    [page.state, page.receivedAt, page.receivedStamp, page.standing] = ["live", now, data.now, data.standing];
     if (name === "board") {
       page.vehicles.clear();
       page.staleAfter = data.stale_after;
-      say(at("source"), `${data.source}`);
+      setText(at("source"), `${data.source}`);
       at("source").title = `mav-robot-status ${data.version}`;
     }
     for (const line of data.vehicles) {
       const known = page.vehicles.get(line.handle);
-      if (known) known.renew(line);
+      if (known) known.setLine(line);
       else page.vehicles.set(line.handle, new Vehicle(line));
     }
-    for (const [handle, beat] of Object.entries(data.beats ?? {})) page.vehicles.get(handle)?.beat(...beat);
+    for (const [handle, beat] of Object.entries(data.beats ?? {})) page.vehicles.get(handle)?.heartbeat(...beat);
     return render();
   },
   lost() {
@@ -85,11 +85,11 @@ function render() {
   const denied = page.state === "denied";
   const vehicle = page.vehicles.get(one.handle);
   at("token").hidden = !denied;
-  at("fleet").hidden = denied || one.handle !== null || page.heardAt === null;
-  at("vehicle").hidden = denied || one.handle === null || page.heardAt === null;
+  at("fleet").hidden = denied || one.handle !== null || page.receivedAt === null;
+  at("vehicle").hidden = denied || one.handle === null || page.receivedAt === null;
   if (one.handle === null) fleet.show(ordered());
   else if (vehicle) one.show(vehicle);
-  else say(at("who"), "the gateway does not know this vehicle");
+  else setText(at("who"), "The gateway has no such vehicle.");
   age();
 }
 
@@ -97,12 +97,12 @@ function age() {
   const live = page.state === "live" && page.standing === null;
   document.body.classList.toggle("stale", page.state === "lost" || page.standing !== null);
   const looks = {
-    live: { shape: "heard", word: "live", tone: "calm" },
+    live: { shape: "bars", word: "live", tone: "calm" },
     connecting: { shape: "ring", word: "connecting …", tone: "unknown" },
     lost: { shape: "lost", word: "NOT CONNECTED", tone: "danger" },
     denied: { shape: "bar", word: "token needed", tone: "caution" },
   };
-  const look = page.standing !== null && page.state === "live" ? { ...looks.lost, word: "STANDING STILL" } : looks[page.state];
+  const look = page.standing !== null && page.state === "live" ? { ...looks.lost, word: "STALLED" } : looks[page.state];
   if (at("connection").textContent !== look.word) at("connection").replaceChildren(chip(look));
   const vehicle = page.vehicles.get(one.handle);
   if (one.handle === null) fleet.age(page.vehicles.values());
@@ -115,8 +115,8 @@ function warn() {
   const lost = page.state === "lost";
   banner.hidden = !(lost || page.standing !== null) || page.state === "denied";
   if (banner.hidden) return;
-  const since = page.heardAt === null ? "" : ` since ${clock(page.heardStamp)}, ${span(seconds() - page.heardAt)} ago. All that is shown is from then`;
-  say(banner, lost ? `No connection to the gateway${since}. Trying again.` : `The gateway has not turned for ${span(page.standing)}. What is shown may be old.`);
+  const since = page.receivedAt === null ? "" : ` since ${clock(page.receivedStamp)}, ${span(seconds() - page.receivedAt)} ago. The data shown is from then`;
+  setText(banner, lost ? `No connection to the gateway${since}. Trying again.` : `The gateway has been stalled for ${span(page.standing)}. The data shown may be old.`);
 }
 
 function route() {
@@ -124,7 +124,7 @@ function route() {
   try {
     handle = decodeURIComponent(location.hash.replace(/^#\/?/, "")) || null;
   } catch {
-    // a broken link leads to the fleet
+    // an invalid link shows the fleet
   }
   if (handle?.startsWith("token=")) {
     sessionStorage.setItem(TOKEN, handle.slice(6));

@@ -1,6 +1,6 @@
-// The event stream. It is read with fetch rather than EventSource, which can neither show a token nor tell why it failed.
+// The event stream. It uses fetch: EventSource can neither send a token nor report why it failed.
 
-const SILENCE = 3500; // ms without a word of the gateway, which speaks once a second
+const SILENCE = 3500; // ms without data after which the stream is reopened; the gateway sends at least once a second
 const RETRY = 1000; // ms
 
 /** Follows the stream until `close`; `on` has open(), event(name, data), lost(), denied(). */

@@ -1,21 +1,31 @@
-// How each value is shown: a shape, a word and a tone. The tone is never all there is.
+// The look of each value: a shape, a word and a tone. The tone is never the only difference.
+
+import { STATES } from "./fields.js"; // the gateway generates it from its table of fields
 
 const unknown = { shape: "unknown", word: "UNKNOWN", tone: "unknown" };
 const calm = (shape, word) => ({ shape, word, tone: "calm" });
 
-export const FIELDS = [
-  { name: "mode", head: "Mode", ask: "Who is in charge" },
-  { name: "motion_possible", head: "Motion possible", ask: "Motion possible",
+const LOOKS = [
+  { name: "mode", head: "Mode", title: "Who is in charge" },
+  { name: "motion_possible", head: "Motion possible", title: "Motion possible",
     yes: { shape: "yes", word: "YES", tone: "good" }, no: { shape: "bar", word: "NO", tone: "caution" } },
-  { name: "in_motion", head: "In motion", ask: "In motion",
+  { name: "in_motion", head: "In motion", title: "In motion",
     yes: { shape: "move", word: "MOVING", tone: "active" }, no: calm("still", "still") },
-  { name: "drives_powered", head: "Drives", ask: "Drives powered",
+  { name: "drives_powered", head: "Drives", title: "Drives powered",
     yes: { shape: "power", word: "POWERED", tone: "caution" }, no: calm("ring", "off") },
-  { name: "e_stopped", head: "E-stop", ask: "Emergency stop",
+  { name: "e_stopped", head: "E-stop", title: "Emergency stop",
     yes: { shape: "stop", word: "STOPPED", tone: "danger" }, no: calm("ring", "no") },
-  { name: "in_error", head: "Error", ask: "Error",
+  { name: "in_error", head: "Error", title: "Error",
     yes: { shape: "error", word: "ERROR", tone: "danger" }, no: calm("ring", "none") },
 ];
+
+const plain = ({ name }) => {
+  const words = name[0].toUpperCase() + name.slice(1).replaceAll("_", " ");
+  return { name, head: words, title: words, yes: calm("yes", "YES"), no: calm("ring", "no") };
+};
+
+/** The fields of the gateway: those above in their order, then those without an entry above. */
+export const FIELDS = [...LOOKS, ...STATES.filter(({ name }) => !LOOKS.some((look) => look.name === name)).map(plain)];
 
 const MODES = {
   AUTO: { shape: "auto", word: "AUTO", tone: "active" },
@@ -23,44 +33,44 @@ const MODES = {
 };
 
 const LINKS = {
-  CONNECTED: { shape: "heard", word: "heard", tone: "calm" },
+  CONNECTED: { shape: "bars", word: "connected", tone: "calm" },
   LOST: { shape: "lost", word: "LOST", tone: "danger" },
   NEVER_SEEN: { shape: "unknown", word: "NEVER SEEN", tone: "unknown" },
 };
 
-export const LINK = { name: "link", head: "Link", ask: "Link" };
+export const LINK = { name: "link", head: "Link", title: "Link" };
 
-/** How a field's value is shown; whatever the value is. */
+/** The look of a field's value. Any value is allowed. */
 export function looks(field, value) {
   if (field.name === "mode") return Object.hasOwn(MODES, value) ? MODES[value] : unknown;
   if (field.name === "link") return Object.hasOwn(LINKS, value) ? LINKS[value] : unknown;
   return value === true ? field.yes : value === false ? field.no : unknown;
 }
 
-/** The state in large, for somebody who stands beside the robot. */
+/** The verdict: one large word for a person beside the robot. */
 export function verdict(line) {
-  if (line.link?.state !== "CONNECTED") return { shape: "lost", word: "NOT HEARD", tone: "unknown", says: "Nothing is known of it now. It may move." };
-  if (line.in_motion === true) return { shape: "move", word: "MOVING", tone: "active", says: charge(line) };
-  if (line.e_stopped === true) return { shape: "stop", word: "EMERGENCY STOP", tone: "danger", says: charge(line) };
-  if (line.motion_possible === true) return { shape: "power", word: "MOTION POSSIBLE", tone: "caution", says: charge(line) };
-  if (line.motion_possible === false) return { shape: "bar", word: "MOTION NOT POSSIBLE", tone: "plain", says: charge(line) };
-  return { shape: "unknown", word: "UNKNOWN", tone: "unknown", says: "It is not known whether it can move. " + charge(line) };
+  if (line.link?.state !== "CONNECTED") return { shape: "lost", word: "NO LINK", tone: "unknown", detail: "Its state is unknown. It may move." };
+  if (line.in_motion === true) return { shape: "move", word: "MOVING", tone: "active", detail: charge(line) };
+  if (line.e_stopped === true) return { shape: "stop", word: "EMERGENCY STOP", tone: "danger", detail: charge(line) };
+  if (line.motion_possible === true) return { shape: "power", word: "MOTION POSSIBLE", tone: "caution", detail: charge(line) };
+  if (line.motion_possible === false) return { shape: "bar", word: "MOTION NOT POSSIBLE", tone: "plain", detail: charge(line) };
+  return { shape: "unknown", word: "UNKNOWN", tone: "unknown", detail: "It is unknown whether it can move. " + charge(line) };
 }
 
 function charge(line) {
   const mode = line.vehicle?.flight_mode ? ` (${line.vehicle.flight_mode})` : "";
   if (line.mode === "AUTO") return `A program is in charge${mode}.`;
   if (line.mode === "MANUAL") return `A person is in charge${mode}.`;
-  return `It is not known who is in charge${mode}.`;
+  return `It is unknown who is in charge${mode}.`;
 }
 
-/** `12:03:04` of a stamp or a Date, in the time of whoever reads. */
+/** `12:03:04` of a stamp or a Date, in the reader's time zone. */
 export function clock(time) {
   const date = new Date(time);
   return Number.isNaN(date.getTime()) ? "?" : date.toLocaleTimeString([], { hourCycle: "h23" });
 }
 
-/** A duration for reading: `< 2 s`, `14 s`, `3 min 12 s`, `2 h 5 min`. */
+/** A duration as text: `< 2 s`, `14 s`, `3 min 12 s`, `2 h 5 min`. */
 export function span(seconds) {
   if (typeof seconds !== "number" || !(seconds >= 0)) return "?";
   if (seconds < 2) return "< 2 s";

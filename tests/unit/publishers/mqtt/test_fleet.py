@@ -15,21 +15,21 @@ from mav_robot_status.publishers.mqtt.lines import line_of
 KEEPALIVE = 10.0
 
 
-class Ear:
-    """A fleet, and what a board would show of it."""
+class Subscriber:
+    """A fleet, and the lines that a board would show."""
 
     def __init__(self) -> None:
         self.fleet = Fleet("plant/robots", KEEPALIVE)
         self.shown: dict[str, dict[str, Any]] = {}
 
-    def hear(self, what: str, payload: str, at: float, retained: bool = False, robot: str = "r") -> str | None:
+    def receive(self, what: str, payload: str, at: float, retained: bool = False, robot: str = "r") -> str | None:
         self.fleet.take(f"plant/robots/{robot}/{what}", payload.encode(), retained, now(at))
         return self.mode(at)
 
     def status(self, seq: int, at: float, retained: bool = False) -> str | None:
-        status = RobotStatus(RobotMode.AUTO)
+        status = RobotStatus(mode=RobotMode.AUTO)
         line = line_of(RobotStatusMsg("rover", seq * 1_000_000, status, Detail(1, 1), 0.1), seq)
-        return self.hear("status", line, at, retained)
+        return self.receive("status", line, at, retained)
 
     def mode(self, at: float) -> str | None:
         self.fleet.expire(now(at))
@@ -41,76 +41,76 @@ def now(at: float) -> Instant:
     return Instant(at, round(at * 1e6))
 
 
-def test_a_status_counts_once_it_has_renewed_itself() -> None:
-    ear = Ear()
-    assert ear.hear("connection", "ONLINE", 0.0) == "UNKNOWN"
-    assert ear.status(0, 0.1) == "UNKNOWN"
-    assert ear.status(1, 1.1) == "AUTO"
-    assert ear.shown["r"]["handle"] == "r"
+def test_a_status_is_live_once_a_second_one_follows() -> None:
+    subscriber = Subscriber()
+    assert subscriber.receive("connection", "ONLINE", 0.0) == "UNKNOWN"
+    assert subscriber.status(0, 0.1) == "UNKNOWN"
+    assert subscriber.status(1, 1.1) == "AUTO"
+    assert subscriber.shown["r"]["handle"] == "r"
 
 
-def test_what_a_broker_retained_does_not_count() -> None:
-    ear = Ear()
-    ear.hear("connection", "ONLINE", 0.0, retained=True)
-    assert ear.status(5, 0.1, retained=True) == "UNKNOWN"
-    assert ear.status(6, 1.0) == "AUTO"
+def test_a_retained_status_is_not_live() -> None:
+    subscriber = Subscriber()
+    subscriber.receive("connection", "ONLINE", 0.0, retained=True)
+    assert subscriber.status(5, 0.1, retained=True) == "UNKNOWN"
+    assert subscriber.status(6, 1.0) == "AUTO"
 
 
-def test_what_a_bridge_brings_up_again_does_not_count() -> None:
-    ear = Ear()
-    ear.hear("connection", "ONLINE", 0.0)
-    ear.status(0, 0.0)
-    assert ear.status(1, 1.0) == "AUTO"
-    assert ear.mode(1.0 + KEEPALIVE + 0.1) == "UNKNOWN"
-    assert ear.status(1, 60.0) == "UNKNOWN"
-    assert ear.status(7, 90.0) == "UNKNOWN"
-    assert ear.status(8, 91.0) == "AUTO"
+def test_an_old_status_from_a_bridge_is_not_live() -> None:
+    subscriber = Subscriber()
+    subscriber.receive("connection", "ONLINE", 0.0)
+    subscriber.status(0, 0.0)
+    assert subscriber.status(1, 1.0) == "AUTO"
+    assert subscriber.mode(1.0 + KEEPALIVE + 0.1) == "UNKNOWN"
+    assert subscriber.status(1, 60.0) == "UNKNOWN"
+    assert subscriber.status(7, 90.0) == "UNKNOWN"
+    assert subscriber.status(8, 91.0) == "AUTO"
 
 
-def test_without_a_gateway_that_says_it_is_there_nothing_counts() -> None:
-    ear = Ear()
-    ear.status(0, 0.0)
-    assert ear.status(1, 1.0) == "UNKNOWN"
-    assert ear.hear("connection", "ONLINE", 1.5) == "UNKNOWN"
-    assert ear.status(2, 2.0) == "AUTO"
+def test_a_status_is_not_live_unless_the_connection_is_online() -> None:
+    subscriber = Subscriber()
+    subscriber.status(0, 0.0)
+    assert subscriber.status(1, 1.0) == "UNKNOWN"
+    assert subscriber.receive("connection", "ONLINE", 1.5) == "UNKNOWN"
+    assert subscriber.status(2, 2.0) == "AUTO"
     for state in ("CONNECTIONBROKEN", "OFFLINE", "", "rubbish"):
-        assert ear.hear("connection", state, 2.0) == "UNKNOWN"
-        assert ear.status(3, 2.1) == "UNKNOWN"
+        assert subscriber.receive("connection", state, 2.0) == "UNKNOWN"
+        assert subscriber.status(3, 2.1) == "UNKNOWN"
 
 
-def test_why_a_robot_is_unknown_is_told() -> None:
-    ear = Ear()
-    ear.status(0, 0.0)
-    said = []
+def test_the_inhibit_gives_the_reason_why_a_robot_is_unknown() -> None:
+    subscriber = Subscriber()
+    subscriber.status(0, 0.0)
+    texts = []
     for state in ("", "ONLINE", "OFFLINE", "CONNECTIONBROKEN"):
-        ear.hear("connection", state, 0.0)
-        said.append(ear.shown["r"]["inhibits"][0]["text"])
-    assert said == [
-        "no gateway has said that it is there",
-        "the gateway says nothing new",
-        "the gateway was ended",
+        subscriber.receive("connection", state, 0.0)
+        texts.append(subscriber.shown["r"]["inhibits"][0]["text"])
+    assert texts == [
+        "no gateway is online",
+        "the gateway publishes nothing new",
+        "the gateway was stopped",
         "the gateway is gone",
     ]
-    assert (ear.shown["r"]["system"], ear.shown["r"]["link"]["state"]) == (1, "LOST")
+    assert (subscriber.shown["r"]["system"], subscriber.shown["r"]["link"]["state"]) == (1, "LOST")
 
 
-def test_events_are_counted_with_those_that_came_twice_and_not_at_all() -> None:
-    ear = Ear()
+def test_events_duplicates_and_missing_events_are_counted() -> None:
+    subscriber = Subscriber()
     for session, seq in [("a", 4), ("a", 5), ("a", 5), ("a", 8), ("b", 1), ("b", 2)]:
-        ear.hear("events", json.dumps({"session": session, "seq": seq}), 0.0)
-    fleet = ear.fleet
+        subscriber.receive("events", json.dumps({"session": session, "seq": seq}), 0.0)
+    fleet = subscriber.fleet
     assert (fleet.events, fleet.duplicates, fleet.missing) == (5, 1, 2)
     fleet.begin()
-    ear.hear("events", json.dumps({"session": "b", "seq": 9}), 0.0)
+    subscriber.receive("events", json.dumps({"session": "b", "seq": 9}), 0.0)
     assert fleet.missing == 2
 
 
-def test_there_are_no_more_robots_than_a_board_shows() -> None:
-    ear = Ear()
+def test_the_number_of_robots_is_bounded() -> None:
+    subscriber = Subscriber()
     for number in range(5000):
-        ear.hear("connection", "ONLINE", 0.0, robot=f"r{number}")
-    assert len(ear.shown) == 4096
-    assert ear.fleet.refused == 5000 - 4096
+        subscriber.receive("connection", "ONLINE", 0.0, robot=f"r{number}")
+    assert len(subscriber.shown) == 4096
+    assert subscriber.fleet.refused == 5000 - 4096
 
 
 LINE = json.loads(line_of(RobotStatusMsg("rover", 0, RobotStatus(), Detail(1, 1), 0.1), 0))
@@ -122,12 +122,12 @@ JSON = st.recursive(
 
 
 @given(st.sampled_from(sorted(LINE)), JSON, st.sampled_from(["status", "events", "connection", "x/y", ""]), st.binary())
-def test_nothing_that_anybody_publishes_raises(name: str, value: Any, what: str, rubbish: bytes) -> None:
-    ear, board = Ear(), Board()
-    ear.hear("connection", "ONLINE", 0.0)
+def test_no_published_content_raises(name: str, value: Any, what: str, rubbish: bytes) -> None:
+    subscriber, board = Subscriber(), Board()
+    subscriber.receive("connection", "ONLINE", 0.0)
     for seq, line in enumerate([LINE, {**LINE, name: value}, LINE]):
         for payload in (json.dumps({**line, "seq": seq, **({name: value} if line != LINE else {})}).encode(), rubbish):
-            ear.fleet.take(f"plant/robots/r/{what}", payload, False, now(seq + 1.0))
-            for robot, shown in ear.fleet.news().items():
-                board.take_line(robot, shown, seq + 1.0)
+            subscriber.fleet.take(f"plant/robots/r/{what}", payload, False, now(seq + 1.0))
+            for robot, shown in subscriber.fleet.news().items():
+                board.update_line(robot, shown, seq + 1.0)
                 json.dumps([entry.whole() for entry in board], allow_nan=False)

@@ -28,68 +28,68 @@ def path(tmp_path: Path) -> str:
 
 
 def left(path: str, last: int = 0) -> list[int]:
-    """The places of the events that a gateway finds which begins now."""
+    """The places of the events that a newly started gateway finds."""
     with closing(Journal(path, last)) as journal:
         return [event.place for event in journal.left]
 
 
-def test_what_is_kept_is_in_the_file_at_once(path: str) -> None:
+def test_an_appended_event_is_in_the_file_at_once(path: str) -> None:
     with closing(Journal(path, 0)) as journal:
         for place in range(1, 4):
-            journal.keep(event(place, '{"text": "Führerstand\\n"}'))
+            journal.append(event(place, '{"text": "Führerstand\\n"}'))
             assert left(path) == list(range(1, place + 1))
     with closing(Journal(path, 0)) as again:
         assert (again.left[0], again.place) == (event(1, '{"text": "Führerstand\\n"}'), 3)
 
 
-def test_what_the_spool_has_is_not_told_again(path: str) -> None:
+def test_events_in_the_spool_are_not_delivered_again(path: str) -> None:
     with closing(Journal(path, 0)) as journal:
         for place in (1, 2, 3):
-            journal.keep(event(place))
+            journal.append(event(place))
     assert left(path, 2) == [3]
     assert left(path, 3) == []
 
 
-def test_the_file_begins_anew_only_when_the_spool_has_everything(path: str) -> None:
+def test_writing_restarts_at_the_beginning_only_when_the_spool_has_everything(path: str) -> None:
     with closing(Journal(path, 0)) as journal:
         for place in (1, 2, 3):
-            journal.keep(event(place))
+            journal.append(event(place))
         journal.forget(2)
-        journal.keep(event(4))
+        journal.append(event(4))
         assert left(path) == [1, 2, 3, 4]
         journal.forget(4)
-        journal.keep(event(5))
-        assert left(path) == [5]  # and not those behind it, of before
+        journal.append(event(5))
+        assert left(path) == [5]  # and not the older records behind it
 
 
-def test_a_second_life_goes_on_behind_what_the_first_left(path: str) -> None:
+def test_a_restarted_gateway_appends_to_the_events_of_the_last_run(path: str) -> None:
     with closing(Journal(path, 0)) as journal:
-        journal.keep(event(1))
+        journal.append(event(1))
     with closing(Journal(path, 0)) as journal:
-        journal.keep(event(2))
+        journal.append(event(2))
         assert left(path) == [1, 2]
 
 
 def test_the_file_never_grows(path: str) -> None:
     with closing(Journal(path, 0)) as journal:
         for place in range(1, 40):
-            journal.keep(event(place, "x" * 100_000))
+            journal.append(event(place, "x" * 100_000))
         assert left(path) == list(range(1, 11))
         assert os.path.getsize(path) == SIZE
         journal.forget(39)
-        journal.keep(event(40))
+        journal.append(event(40))
         assert left(path) == [40]
 
 
 @settings(max_examples=40, deadline=None)
 @given(cut=st.integers(0, 400), rubbish=st.binary(max_size=300))
-def test_what_was_half_written_when_the_power_failed_is_left_out(
+def test_a_record_that_a_power_failure_cut_is_skipped(
     tmp_path_factory: pytest.TempPathFactory, cut: int, rubbish: bytes
 ) -> None:
     path = tmp_path_factory.mktemp("journal") / "new"
     with closing(Journal(str(path), 0)) as journal:
         for place in range(1, 6):
-            journal.keep(event(place, json.dumps({"number": place})))
+            journal.append(event(place, json.dumps({"number": place})))
     data = path.read_bytes()
     path.write_bytes(data[:cut] + rubbish + data[cut + len(rubbish) :])
     whole = left(str(path))
@@ -99,7 +99,7 @@ def test_what_was_half_written_when_the_power_failed_is_left_out(
 
 @pytest.fixture
 def hanging(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
-    """A disk that takes nothing until what is given is called."""
+    """A disk on which writes block until the returned function is called."""
     free, write = threading.Event(), os.pwrite
 
     def hang(fd: int, data: bytes, offset: int) -> int:
@@ -111,34 +111,34 @@ def hanging(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
     free.set()
 
 
-def test_a_disk_that_hangs_holds_up_the_gateway_once_and_shortly(
+def test_a_hanging_disk_delays_the_gateway_once_and_briefly(
     path: str, hanging: Callable[[], None], caplog: pytest.LogCaptureFixture
 ) -> None:
     with closing(Journal(path, 0)) as journal:
         start = present().mono
         for place in range(1, 101):
-            journal.keep(event(place))
+            journal.append(event(place))
         assert LONGEST <= present().mono - start < 10 * LONGEST
         hanging()
-        while journal._asked.qsize():  # the thread takes what waited for the disk
+        while journal._pending.qsize():  # the thread writes the events that wait
             pass
-        journal.keep(event(101))
+        journal.append(event(101))
         assert left(path) == list(range(1, 102))
-    assert caplog.text.count("the disk took no event within") == 1
-    assert "100 events were told to others before they were on the disk" in caplog.text
+    assert caplog.text.count("the disk wrote no event within") == 1
+    assert "100 events were published before they were on the disk" in caplog.text
 
 
-def test_what_waits_for_a_disk_that_hangs_is_bounded(
+def test_the_number_of_events_that_wait_for_a_hanging_disk_is_bounded(
     path: str, hanging: Callable[[], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "MOST_ASKED", 10)
+    monkeypatch.setattr(module, "MOST_PENDING", 10)
     with closing(Journal(path, 0)) as journal:
         for place in range(1, 101):
-            journal.keep(event(place))
-        assert journal._asked.qsize() <= 10
+            journal.append(event(place))
+        assert journal._pending.qsize() <= 10
         hanging()
 
 
-def test_a_file_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(LinkError, match=r"events cannot wait in .*Is a directory"):
+def test_a_file_that_cannot_be_created_is_an_error_of_one_line(tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match=r"cannot store events in .*Is a directory"):
         Journal(str(tmp_path), 0)

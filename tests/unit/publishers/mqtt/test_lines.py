@@ -14,9 +14,9 @@ from mav_robot_status.interface import (
 )
 from mav_robot_status.publishers.mqtt.lines import event_of, line_of, members_of, unknown
 
-BEFORE = RobotStatus(RobotMode.MANUAL, in_error=TriState.FALSE), Detail(1, 1)
+BEFORE = RobotStatus(mode=RobotMode.MANUAL, in_error=TriState.FALSE), Detail(1, 1)
 AFTER = (
-    RobotStatus(RobotMode.AUTO, in_error=TriState.TRUE, error_code=3),
+    RobotStatus(mode=RobotMode.AUTO, in_error=TriState.TRUE, error_code=3),
     Detail(1, 1, errors=(ErrorCause(3, "BATTERY", None, 0),), vehicle=Vehicle(flight_mode="AUTO")),
 )
 MSG = RobotStatusMsg("rover", 1_000_000, *AFTER, 0.5)
@@ -28,7 +28,7 @@ def test_a_status_is_the_native_line() -> None:
     assert (line["seq"], line["handle"], line["mode"], line["link"]["heartbeat_age"]) == (4, "rover", "AUTO", 0.5)
 
 
-def test_an_event_has_an_id_and_tells_only_what_changed() -> None:
+def test_an_event_has_an_id_and_the_changed_members_only() -> None:
     event = event_of(MSG, OLD, NEW, "r1", "abcd", 9)
     assert (event["id"], event["session"], event["seq"], event["robot"]) == ("abcd-9", "abcd", 9, "r1")
     assert event["stamp"] == "1970-01-01T00:00:01.000000Z"
@@ -37,13 +37,13 @@ def test_an_event_has_an_id_and_tells_only_what_changed() -> None:
     assert event["changed"]["errors"]["old"] == []
 
 
-def test_the_first_event_tells_all_members() -> None:
+def test_the_first_event_has_all_members() -> None:
     changed = event_of(MSG, {}, NEW, "r1", "abcd", 1)["changed"]
     assert {change["old"] for change in changed.values()} == {None}
     assert changed["link.state"]["new"] == LinkState.CONNECTED.value
 
 
-def test_of_a_robot_that_nobody_speaks_for_only_who_it_is_stays() -> None:
+def test_a_robot_without_a_live_status_keeps_only_its_identity() -> None:
     left = unknown(json.loads(line_of(MSG, 4)), "now", "why")
     assert (left["system"], left["mode"], left["in_error"], left["errors"]) == (1, "UNKNOWN", None, [])
     assert (left["vehicle"]["flight_mode"], left["link"]["state"]) == (None, "LOST")

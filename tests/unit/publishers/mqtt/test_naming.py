@@ -13,18 +13,18 @@ def msg(system: int | None = 7, handle: str = "rover") -> RobotStatusMsg:
     return RobotStatusMsg(handle, 0, RobotStatus(), Detail(system, None if system is None else 1), None)
 
 
-def test_a_name_is_made_of_what_is_known(tmp_path: Path) -> None:
+def test_a_template_is_filled_in_with_known_values(tmp_path: Path) -> None:
     serial = tmp_path / "serial"
     serial.write_text("1000abcd\0")
     naming = Naming("{host}.{serial}.{system}.{component}.{handle}", "pi", ("/nowhere", str(serial)))
     assert naming.name(msg()) == "pi.1000abcd.7.1.rover"
 
 
-def test_a_name_may_be_a_serial_number_as_it_is() -> None:
+def test_a_name_may_be_the_bare_serial_number() -> None:
     assert Naming("AGV-0042").name(msg(None)) == "AGV-0042"
 
 
-def test_without_what_the_template_asks_for_there_is_no_name_yet() -> None:
+def test_a_robot_has_no_name_while_a_value_of_the_template_is_unknown() -> None:
     assert Naming("{host}-{system}", "pi").name(msg(None)) is None
 
 
@@ -34,11 +34,11 @@ def test_a_name_is_one_level_of_a_topic() -> None:
 
 
 @pytest.mark.parametrize("template", ["{color}", "{system.real}", "{0}", "{", "{system!q}", ""])
-def test_what_is_no_template_is_one_line(template: str) -> None:
+def test_an_invalid_template_is_an_error(template: str) -> None:
     with pytest.raises(UsageError, match="robot"):
         Naming(template)
 
 
-def test_a_serial_number_that_nobody_knows_is_said() -> None:
+def test_a_missing_serial_number_is_an_error() -> None:
     with pytest.raises(UsageError, match=r"without \{serial\}"):
         Naming("{serial}", serials=("/nowhere",))

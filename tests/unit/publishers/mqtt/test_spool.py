@@ -54,7 +54,7 @@ def test_events_come_back_in_order_and_by_robot(spool: Spool) -> None:
     assert spool.waiting == 4
 
 
-def test_what_is_done_does_not_come_again(spool: Spool) -> None:
+def test_delivered_events_are_not_returned_again(spool: Spool) -> None:
     fill(spool, "a", "b")
     spool.done(spool.after("r", 0, 1)[0])
     assert texts(spool) == ["b"]
@@ -63,17 +63,17 @@ def test_what_is_done_does_not_come_again(spool: Spool) -> None:
     assert spool.waiting == 1
 
 
-def test_what_waits_outlives_its_process(path: str) -> None:
+def test_waiting_events_survive_their_process(path: str) -> None:
     killed = Spool(path, 10_000, 100.0)
     fill(killed, "a", "b")
-    killed._db.close()  # as the kernel does, without a word
+    killed._db.close()  # as the kernel does, without a close of the spool
     again = Spool(path, 10_000, 100.0)
     fill(again, "c")
     assert texts(again) == ["a", "b", "c"]
     again.close(0.0, 0.0)
 
 
-def test_places_rise_for_ever_also_after_everything_was_delivered(path: str) -> None:
+def test_places_still_rise_after_everything_was_delivered(path: str) -> None:
     made = Spool(path, 10_000, 100.0)
     fill(made, "a", "b")
     for event in made.after("r", 0, 2):
@@ -85,26 +85,26 @@ def test_places_rise_for_ever_also_after_everything_was_delivered(path: str) -> 
     again.close(0.0, 0.0)
 
 
-def test_a_place_counts_as_last_only_when_it_is_on_the_disk(spool: Spool) -> None:
+def test_last_is_the_place_of_the_last_event_on_disk(spool: Spool) -> None:
     add(spool, "a", "late")
     assert (spool.last, spool.robots()) == (0, ["late"])
     spool.flush(0.0, 0.0)
     assert (spool.last, spool.robots()) == (1, ["late"])
 
 
-def test_a_second_gateway_is_told_to_take_another_file(spool: Spool, path: str) -> None:
+def test_a_second_gateway_needs_another_file(spool: Spool, path: str) -> None:
     fill(spool, "a")
     with pytest.raises(LinkError, match="give each its own --mqtt-spool"):
         Spool(path, 10_000, 100.0)
 
 
-def test_a_file_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_created_is_an_error_of_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(LinkError, match="events cannot wait in"):
+    with pytest.raises(LinkError, match="cannot store events in"):
         Spool(str(tmp_path / "file" / "spool"), 10_000, 100.0)
 
 
-def test_a_broken_file_is_kept_aside(path: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_corrupt_file_is_renamed_and_replaced(path: str, caplog: pytest.LogCaptureFixture) -> None:
     os.makedirs(os.path.dirname(path))
     Path(path).write_bytes(b"no database" * 1000)
     made = Spool(path, 10_000, 100.0)
@@ -112,10 +112,10 @@ def test_a_broken_file_is_kept_aside(path: str, caplog: pytest.LogCaptureFixture
     assert texts(made) == ["a"]
     made.close(0.0, 0.0)
     assert Path(f"{path}.broken").read_bytes().startswith(b"no database")
-    assert "was broken" in caplog.text
+    assert "is corrupt" in caplog.text
 
 
-def test_the_oldest_are_dropped_when_there_are_too_many_bytes(path: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_oldest_events_are_dropped_beyond_the_size_limit(path: str, caplog: pytest.LogCaptureFixture) -> None:
     made = Spool(path, 3 * (OVERHEAD + 1), 100.0)
     fill(made, "a", "b", "c", "d", "e")
     assert texts(made) == ["c", "d", "e"]
@@ -127,7 +127,7 @@ def test_the_oldest_are_dropped_when_there_are_too_many_bytes(path: str, caplog:
     again.close(0.0, 0.0)
 
 
-def test_what_is_too_old_is_dropped(spool: Spool) -> None:
+def test_events_beyond_the_age_limit_are_dropped(spool: Spool) -> None:
     fill(spool, "before the clock was set", at=5.0)
     fill(spool, "a", at=CLOCK_SET)
     fill(spool, "b", at=CLOCK_SET + 90.0, now=SWEEP)
@@ -136,7 +136,7 @@ def test_what_is_too_old_is_dropped(spool: Spool) -> None:
     assert spool.dropped["r"] == 1
 
 
-def test_an_event_that_was_dropped_while_it_was_on_its_way_counts_once(path: str) -> None:
+def test_an_event_dropped_before_its_acknowledgement_counts_once(path: str) -> None:
     made = Spool(path, 2 * (OVERHEAD + 1), 100.0)
     fill(made, "a", "b")
     on_its_way = made.after("r", 0, 1)[0]
@@ -161,7 +161,7 @@ def test_while_the_disk_is_full_events_wait_in_memory(spool: Spool, caplog: pyte
     assert texts(spool) == ["c"]
     add(spool, "d" * 8000)
     spool.flush(4 * RETRY, 0.0)
-    assert (spool.last, spool.settled) == (1, 2)  # the second was delivered, and never on the disk
+    assert (spool.last, spool.settled) == (1, 2)  # the second was delivered from memory, and never was on disk
     spool._db.execute("PRAGMA max_page_count = 100000")
     spool.flush(6 * RETRY, 0.0)
     assert not spool.failed
@@ -169,7 +169,7 @@ def test_while_the_disk_is_full_events_wait_in_memory(spool: Spool, caplog: pyte
     assert len([r for r in caplog.records if r.levelno == logging.WARNING]) == 2
 
 
-def test_memory_is_bounded_too(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_events_in_memory_is_bounded(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_UNWRITTEN", 3)
     for text in "abcde":
         add(spool, text)
@@ -177,7 +177,7 @@ def test_memory_is_bounded_too(spool: Spool, monkeypatch: pytest.MonkeyPatch) ->
     assert spool.dropped["r"] == 2
 
 
-def test_the_file_does_not_grow_beyond_its_bound(path: str) -> None:
+def test_the_file_does_not_grow_beyond_its_limit(path: str) -> None:
     made = Spool(path, 50_000, 100.0)
     for number in range(3000):
         fill(made, json.dumps({"number": number, "rest": "x" * 100}))
@@ -189,7 +189,7 @@ def test_the_file_does_not_grow_beyond_its_bound(path: str) -> None:
 @given(
     steps=st.lists(st.tuples(st.sampled_from(["add", "done", "flush", "again"]), st.sampled_from("rs")), max_size=60)
 )
-def test_whatever_happens_nothing_is_lost_and_the_order_stays(
+def test_no_sequence_of_calls_loses_an_event_or_changes_the_order(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[str, str]]
 ) -> None:
     path = str(tmp_path_factory.mktemp("spool") / "s")

@@ -1,4 +1,4 @@
-"""A server of a board, and whoever asks it."""
+"""A server of a board, and its clients."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import http.client
 import json
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -16,10 +15,10 @@ from mav_robot_status.clock import now as present
 from mav_robot_status.interface import RobotStatusMsg
 from mav_robot_status.publishers.board import Board
 from mav_robot_status.publishers.web.events import Events
-from mav_robot_status.publishers.web.options import WebOptions
 from mav_robot_status.publishers.web.serve import WebServer
+from mav_robot_status.publishers.web.settings import WebSettings
 
-SOON = 8.0  # s
+from ....deadline import SOON, allow, wait_until
 
 
 class Answer(NamedTuple):
@@ -33,10 +32,10 @@ class Answer(NamedTuple):
 
 
 class Site:
-    """`with Site() as site:`; its port is any that is free."""
+    """`with Site() as site:`. The kernel picks a free port."""
 
     def __init__(self, clock: Callable[[], Instant] = present, **options: Any) -> None:
-        self.server = WebServer(Board(), WebOptions(port=0, **options), clock)
+        self.server = WebServer(Board(), WebSettings(port=0, **options), clock)
         self.port = int(self.server.url.rpartition(":")[2].strip("/"))
 
     def __enter__(self) -> Site:
@@ -49,19 +48,19 @@ class Site:
         self.server.close()
 
     def take(self, *messages: RobotStatusMsg) -> None:
-        """Put statuses on the board; they are there when this returns."""
+        """Put statuses on the board; return when they are there."""
         done = threading.Event()
 
         def change(board: Board, events: Events, now: Instant) -> None:
             for message in messages:
-                board.take(message, now.mono)
+                board.update(message, now.mono)
             done.set()
 
         until(lambda: self.server.post(change))
-        assert done.wait(SOON)
+        assert done.wait(allow(SOON))
 
     def ask(self, path: str, method: str = "GET", **headers: str) -> Answer:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=SOON)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=allow(SOON))
         try:
             named = {name.replace("_", "-"): value for name, value in headers.items()}
             connection.request(method, path, headers=named)
@@ -75,10 +74,10 @@ class Site:
 
 
 class Listening:
-    """Somebody who reads the event stream; or does not."""
+    """A client of the event stream. It may stop reading."""
 
     def __init__(self, port: int, path: str) -> None:
-        self.socket = socket.create_connection(("127.0.0.1", port), SOON)
+        self.socket = socket.create_connection(("127.0.0.1", port), allow(SOON))
         self.socket.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
         self._file = self.socket.makefile("rb")
 
@@ -87,7 +86,7 @@ class Listening:
         return b"".join(iter(self._file.readline, b"\r\n")).decode()
 
     def events(self) -> Iterator[tuple[str, Any]]:
-        """Names and data, as long as they come."""
+        """Names and data until the stream ends."""
         name = ""
         for raw in self._file:
             line = raw.decode().rstrip("\r\n")
@@ -101,9 +100,6 @@ class Listening:
         self.socket.close()
 
 
-def until(condition: Callable[[], bool], seconds: float = SOON) -> None:
-    """Wait until it is so."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come about"
-        time.sleep(0.005)
+def until(condition: Callable[[], bool]) -> None:
+    """Wait until the condition is true."""
+    wait_until(condition)

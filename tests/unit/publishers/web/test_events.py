@@ -15,11 +15,11 @@ from mav_robot_status.testing import ManualClock
 
 from ..port import msg
 
-MANUAL, AUTO = RobotStatus(RobotMode.MANUAL), RobotStatus(RobotMode.AUTO)
+MANUAL, AUTO = RobotStatus(mode=RobotMode.MANUAL), RobotStatus(mode=RobotMode.AUTO)
 
 
 class Stage:
-    """Events of a board on a clock of the test's."""
+    """Events of a board with a manual clock."""
 
     def __init__(self) -> None:
         self.clock = ManualClock()
@@ -33,9 +33,9 @@ class Stage:
         return listener
 
     def take(self, status: RobotStatus, handle: str = "robot") -> None:
-        self.board.take(msg(status, handle=handle), self.clock.now().mono)
+        self.board.update(msg(status, handle=handle), self.clock.now().mono)
 
-    def told(self, listener: Listener) -> list[tuple[str, Any]]:
+    def received(self, listener: Listener) -> list[tuple[str, Any]]:
         return list(parsed(self.events.since(listener)))
 
 
@@ -50,46 +50,46 @@ def stage() -> Stage:
     return Stage()
 
 
-def test_who_comes_is_told_the_whole_board_and_then_what_changes(stage: Stage) -> None:
+def test_a_new_listener_gets_the_whole_board_and_then_changes(stage: Stage) -> None:
     stage.take(MANUAL, "a")
     stage.take(MANUAL, "b")
     listener = stage.listener()
-    [(name, data)] = stage.told(listener)
+    [(name, data)] = stage.received(listener)
     assert name == "board"
     assert [line["handle"] for line in data["vehicles"]] == ["a", "b"]
     assert (data["standing"], data["stale_after"]) == (None, None)
-    assert stage.told(listener) == []
+    assert stage.received(listener) == []
     stage.take(AUTO, "b")
-    [(name, data)] = stage.told(listener)
+    [(name, data)] = stage.received(listener)
     assert (name, [line["handle"] for line in data["vehicles"]]) == ("change", ["b"])
 
 
-def test_a_slow_one_misses_what_was_in_between(stage: Stage) -> None:
+def test_a_slow_listener_misses_the_states_between(stage: Stage) -> None:
     listener = stage.listener()
-    stage.told(listener)
+    stage.received(listener)
     for _ in range(100):
         stage.take(MANUAL)
         stage.take(AUTO)
-    [(_, data)] = stage.told(listener)
+    [(_, data)] = stage.received(listener)
     assert [line["mode"] for line in data["vehicles"]] == ["AUTO"]
 
 
-def test_once_a_second_all_are_told_how_old_each_line_is(stage: Stage) -> None:
+def test_every_listener_gets_the_age_of_each_line_once_a_second(stage: Stage) -> None:
     stage.take(MANUAL)
     listener = stage.listener()
     stage.events.pulse()
-    stage.told(listener)
+    stage.received(listener)
     stage.clock.advance(0.5)
     stage.events.pulse()
-    assert stage.told(listener) == []
+    assert stage.received(listener) == []
     stage.clock.advance(0.5)
     stage.events.pulse()
-    [(_, data)] = stage.told(listener)
+    [(_, data)] = stage.received(listener)
     assert data["vehicles"] == []
     assert data["beats"] == {"robot": ["1970-01-01T00:00:01.000000Z", 0.1, 1.0]}
 
 
-def test_those_who_keep_up_share_the_same_bytes(stage: Stage) -> None:
+def test_listeners_that_keep_up_share_the_same_bytes(stage: Stage) -> None:
     one, other = stage.listener(), stage.listener()
     stage.take(MANUAL)
     stage.events.pulse()
@@ -97,38 +97,38 @@ def test_those_who_keep_up_share_the_same_bytes(stage: Stage) -> None:
     assert len(stage.events._cache) == 1
 
 
-def test_who_looks_at_a_vehicle_is_told_its_history_and_then_what_is_new(stage: Stage) -> None:
+def test_a_listener_of_a_vehicle_gets_its_history_and_then_new_transitions(stage: Stage) -> None:
     stage.take(MANUAL)
     stage.clock.advance(5)
     listener = stage.listener("robot")
-    data = dict(stage.told(listener))["history"]
+    data = dict(stage.received(listener))["history"]
     assert (data["whole"], data["known_for"]) == (True, 5.0)
     assert {"ago": 5.0, "name": "mode", "value": "MANUAL", "before": None}.items() <= data["transitions"][0].items()
     stage.clock.advance(1)
     stage.take(AUTO)
-    data = dict(stage.told(listener))["history"]
+    data = dict(stage.received(listener))["history"]
     assert (data["whole"], [(t["name"], t["before"]) for t in data["transitions"]]) == (False, [("mode", "MANUAL")])
-    assert "history" not in dict(stage.told(listener))
+    assert "history" not in dict(stage.received(listener))
 
 
-def test_a_vehicle_that_nobody_knows_has_no_history(stage: Stage) -> None:
-    assert [name for name, _ in stage.told(stage.listener("nobody"))] == ["board"]
+def test_an_unknown_vehicle_has_no_history(stage: Stage) -> None:
+    assert [name for name, _ in stage.received(stage.listener("nobody"))] == ["board"]
 
 
-def test_an_explanation_is_told_once_and_only_while_somebody_looks(stage: Stage) -> None:
+def test_an_explanation_is_sent_once_and_only_while_a_listener_shows_the_vehicle(stage: Stage) -> None:
     stage.take(MANUAL)
     listener = stage.listener("robot")
-    stage.told(listener)
+    stage.received(listener)
     assert stage.events.watched == {"robot"}
     stage.events.explain("robot", {"fields": {}})
     stage.events.explain("other", {"fields": {}})
-    assert stage.told(listener) == [("explanation", {"fields": {}})]
-    assert stage.told(listener) == []
+    assert stage.received(listener) == [("explanation", {"fields": {}})]
+    assert stage.received(listener) == []
     stage.events.leave(listener)
     assert (stage.events.watched, stage.events.explanations) == (frozenset(), {})
 
 
-def test_who_reads_nothing_for_some_seconds_is_cut_off(stage: Stage) -> None:
+def test_a_listener_that_does_not_read_is_disconnected(stage: Stage) -> None:
     listener = stage.listener()
     listener.busy_since = stage.clock.now().mono
     stage.clock.advance(events.PATIENCE)
@@ -140,13 +140,13 @@ def test_who_reads_nothing_for_some_seconds_is_cut_off(stage: Stage) -> None:
     assert stage.events.dropped == 1
 
 
-def test_there_are_no_more_listeners_than_are_good(stage: Stage) -> None:
+def test_the_number_of_listeners_is_bounded(stage: Stage) -> None:
     for _ in range(events.MOST_LISTENERS):
         stage.listener()
     assert not stage.events.enter(Listener(None, lambda: None))
 
 
-def test_news_wake_those_who_wait_and_nothing_does_not(stage: Stage) -> None:
+def test_only_a_change_wakes_the_listeners(stage: Stage) -> None:
     async def play() -> list[bool]:
         waiting = asyncio.ensure_future(stage.events.wait())
         woken = []
@@ -162,7 +162,7 @@ def test_news_wake_those_who_wait_and_nothing_does_not(stage: Stage) -> None:
         return woken
 
     stage.clock.advance(1.0)
-    stage.events.pulse()  # the tick is told
+    stage.events.pulse()  # a tick
     assert asyncio.run(play()) == [False, True]
 
 

@@ -16,10 +16,11 @@ from mav_robot_status.interface import PublisherContext, RobotMode, RobotStatus
 from mav_robot_status.publishers.web import publisher as publishers
 from mav_robot_status.publishers.web.publisher import HttpPublisher
 
+from ....deadline import SOON, allow
 from ..port import Port, msg
-from .site import SOON, Listening, until
+from .site import Listening, until
 
-MANUAL, AUTO = RobotStatus(RobotMode.MANUAL), RobotStatus(RobotMode.AUTO)
+MANUAL, AUTO = RobotStatus(mode=RobotMode.MANUAL), RobotStatus(mode=RobotMode.AUTO)
 Explain = Callable[[str, Instant], Mapping[str, Any] | None]
 
 
@@ -34,14 +35,14 @@ def publishing(explain: Explain | None = None) -> Iterator[HttpPublisher]:
 
 
 def waits_for(event: threading.Event) -> None:
-    event.wait(SOON)
+    event.wait(allow(SOON))
 
 
 def port(publisher: HttpPublisher) -> int:
     return int(publisher.url.rpartition(":")[2].strip("/"))
 
 
-def test_what_is_published_is_on_the_board_in_the_other_thread() -> None:
+def test_published_messages_reach_the_board_in_the_other_thread() -> None:
     with publishing() as publisher:
         assert not publisher.busy()
         publisher.publish(msg(MANUAL))
@@ -53,7 +54,7 @@ def test_what_is_published_is_on_the_board_in_the_other_thread() -> None:
         assert [t.value for t in board.entries["robot"].transitions if t.name == "mode"] == ["MANUAL", "AUTO"]
 
 
-def test_a_server_that_is_late_gets_the_last_state_of_each_and_the_rest_is_let_go(
+def test_a_busy_server_gets_the_last_status_of_each_handle_and_the_rest_is_dropped(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(publishers, "MOST_WAITING", 10)
@@ -73,7 +74,7 @@ def test_a_server_that_is_late_gets_the_last_state_of_each_and_the_rest_is_let_g
         assert [board.entries[f"robot{n}"].line["error_code"] for n in (0, 1)] == [98, 99]
 
 
-def test_a_vehicle_is_explained_while_somebody_looks_at_it_and_at_once_when_it_changes() -> None:
+def test_a_shown_vehicle_is_explained_periodically_and_at_once_after_a_change() -> None:
     asked: list[tuple[str, float]] = []
 
     def explain(handle: str, now: Instant) -> Mapping[str, Any]:
@@ -99,7 +100,7 @@ def test_a_vehicle_is_explained_while_somebody_looks_at_it_and_at_once_when_it_c
         until(lambda: not publisher._server.watched)
 
 
-def test_of_many_vehicles_one_is_explained_in_a_round_each_in_its_turn() -> None:
+def test_each_round_explains_one_of_the_shown_vehicles_in_turn() -> None:
     asked: list[str] = []
     with publishing(lambda handle, now: asked.append(handle)) as publisher:
         listening = [Listening(port(publisher), f"/events?handle=robot{n}") for n in range(3)]
@@ -111,7 +112,7 @@ def test_of_many_vehicles_one_is_explained_in_a_round_each_in_its_turn() -> None
             one.close()
 
 
-def test_without_the_extra_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_extra_the_error_names_the_package_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "aiohttp", None)
     for name in ("serve", "door"):
         monkeypatch.delitem(sys.modules, f"mav_robot_status.publishers.web.{name}", raising=False)

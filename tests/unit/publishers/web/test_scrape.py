@@ -1,4 +1,4 @@
-"""Who asks for metrics waits for the gateway's next turn."""
+"""A request for metrics waits for the next round of the gateway."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mav_robot_status.publishers.web import scrape
 from mav_robot_status.publishers.web.scrape import Scrapes
 
 ASKED = cast("Any", None)
-"""A request; nothing of it is looked at."""
+"""A request. Its content is not used."""
 
 
-def test_all_who_wait_get_what_was_taken_after_they_asked() -> None:
+def test_all_waiting_requests_get_values_read_after_the_request() -> None:
     async def story() -> None:
         scrapes = Scrapes()
         assert not scrapes.wanted
@@ -32,12 +32,12 @@ def test_all_who_wait_get_what_was_taken_after_they_asked() -> None:
     asyncio.run(story())
 
 
-def test_a_gateway_that_stands_still_gives_no_metrics(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stalled_gateway_gives_no_metrics(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scrape, "PATIENCE", 0.02)
 
     async def story() -> None:
         scrapes = Scrapes()
         assert (await scrapes.answer(ASKED)).status == 503
-        scrapes.give(Metrics())  # nobody waits any more
+        scrapes.give(Metrics())  # no request waits any more
 
     asyncio.run(story())

@@ -14,21 +14,22 @@ from mav_robot_status.clock import now as present
 from mav_robot_status.interface import Detail, RobotMode, RobotStatus
 from mav_robot_status.publishers.board import Board
 from mav_robot_status.publishers.web import events
-from mav_robot_status.publishers.web.options import WebOptions
 from mav_robot_status.publishers.web.serve import STANDING, serve
+from mav_robot_status.publishers.web.settings import WebSettings
 
+from ....deadline import in_time
 from ..port import msg
 from .site import Site, until
 
-MANUAL, AUTO = RobotStatus(RobotMode.MANUAL), RobotStatus(RobotMode.AUTO)
+MANUAL, AUTO = RobotStatus(mode=RobotMode.MANUAL), RobotStatus(mode=RobotMode.AUTO)
 
 
-def test_a_board_is_served_by_itself() -> None:
-    server = serve(Board(), WebOptions(port=0))
+def test_a_board_is_served_without_a_gateway() -> None:
+    server = serve(Board(), WebSettings(port=0))
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/", server.url)
     server.close()
     server.close()
-    assert server.post(lambda board, events, now: None)  # into nothing, and nobody minds
+    assert server.post(lambda board, events, now: None)  # the server is closed: no effect, no error
 
 
 def test_vehicles_are_native_lines() -> None:
@@ -53,13 +54,13 @@ def test_vehicles_are_native_lines() -> None:
         assert (missing.status, missing.json["error"]) == (404, "no such vehicle; /api/v1/vehicles lists them")
 
 
-def test_the_schema_is_the_one_of_the_package() -> None:
+def test_the_schema_is_that_of_the_package() -> None:
     schema = json.loads((files("mav_robot_status") / "data" / "robot_status.schema.json").read_text("utf-8"))
     with Site() as site:
         assert site.ask("/schema.json").json == schema
 
 
-def test_it_is_ready_while_the_source_turns() -> None:
+def test_it_is_ready_while_the_source_runs() -> None:
     with Site() as site:
         site.server.turned = present().mono
         assert (site.ask("/readyz").status, site.ask("/healthz").status) == (200, 200)
@@ -70,7 +71,7 @@ def test_it_is_ready_while_the_source_turns() -> None:
         assert site.ask("/healthz").status == 200
 
 
-def test_a_source_that_need_not_turn_is_ready() -> None:
+def test_it_is_ready_with_an_unchecked_source() -> None:
     with Site() as site:
         assert site.ask("/readyz").json == {"ready": True, "standing": None, "vehicles": 0}
 
@@ -79,7 +80,7 @@ def test_a_source_that_need_not_turn_is_ready() -> None:
     ("path", "kind"),
     [("/", "text/html"), ("/page.js", "text/javascript"), ("/page.css", "text/css"), ("/icon.svg", "image/svg")],
 )
-def test_the_assets_come_with_their_type_and_once(path: str, kind: str) -> None:
+def test_assets_have_a_content_type_and_are_cached(path: str, kind: str) -> None:
     with Site() as site:
         first = site.ask(path)
         assert first.headers["Content-Type"].startswith(kind)
@@ -87,7 +88,7 @@ def test_the_assets_come_with_their_type_and_once(path: str, kind: str) -> None:
         assert site.ask(path, "HEAD").body == b""
 
 
-def test_the_page_needs_nothing_from_elsewhere() -> None:
+def test_the_page_loads_nothing_from_other_hosts() -> None:
     folder = files("mav_robot_status.publishers.web") / "assets"
     for asset in folder.iterdir():
         text = asset.read_text("utf-8")
@@ -96,10 +97,10 @@ def test_the_page_needs_nothing_from_elsewhere() -> None:
             r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(|style=\"|\son[a-z]+=\"", text
         )
         for name in re.findall(r"(?:from |href=|src=)\"(?:\./)?([\w.]+\.(?:js|css|svg))\"", text):
-            assert (folder / name).is_file()
+            assert (folder / name).is_file() or name == "fields.js"  # generated from the table of fields
 
 
-def test_a_change_is_an_event_soon() -> None:
+def test_a_change_is_sent_as_an_event() -> None:
     with Site() as site:
         site.take(msg(MANUAL))
         listening = site.listen("/events?handle=robot")
@@ -112,12 +113,12 @@ def test_a_change_is_an_event_soon() -> None:
         site.take(msg(AUTO))
         data = next(data for name, data in listening.events() if name == "change" and data["vehicles"])
         assert data["vehicles"][0]["mode"] == "AUTO"
-        assert time.monotonic() - start < 1.0
+        assert in_time(time.monotonic() - start, 1.0)
         listening.close()
         until(lambda: not site.server._events.listeners)
 
 
-def test_a_listener_too_many_is_told_to_come_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_listener_beyond_the_limit_gets_503_with_retry_after(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(events, "MOST_LISTENERS", 1)
     with Site() as site:
         first = site.listen()
@@ -127,7 +128,7 @@ def test_a_listener_too_many_is_told_to_come_again(monkeypatch: pytest.MonkeyPat
         first.close()
 
 
-def test_a_dead_browser_is_cut_off_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dead_browser_is_disconnected_and_the_others_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(events, "PATIENCE", 0.3)
     with Site() as site:
         dead, alive = site.listen(), site.listen()
@@ -145,7 +146,7 @@ def test_a_dead_browser_is_cut_off_and_the_others_go_on(monkeypatch: pytest.Monk
         alive.close()
 
 
-def test_it_takes_one_change_at_a_time() -> None:
+def test_it_accepts_one_change_at_a_time() -> None:
     with Site() as site:
         began: list[int] = []
 
@@ -155,6 +156,6 @@ def test_it_takes_one_change_at_a_time() -> None:
 
         assert site.server.post(slow)
         until(lambda: began == [0])
-        assert site.server.post(slow)  # the first is being done, the second waits
+        assert site.server.post(slow)  # the first runs, the second waits
         assert not site.server.post(slow)
         until(lambda: began == [0, 1])

@@ -1,0 +1,111 @@
+"""What a configuration means, for `check-config`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+
+from ..hardware.mavlink.options import HardwareOptions
+from ..interface import DEFAULT_HANDLE_NAME
+from ..links import url
+from .model import Config, ControllerConfig, HardwareConfig, LinkConfig, SigningConfig, VehicleConfig
+from .reader import OUR_TYPES
+
+
+def describe(config: Config) -> list[str]:
+    """What a configuration means, one line per part."""
+    return [
+        *(f"link: {_link(link)}" for link in config.links),
+        *([] if config.links or config.interfaces else ["link: none in the file; give one on the command line"]),
+        *(f"out: {_link(out)}" for out in config.outs),
+        *(f"vehicle: {_vehicle(vehicle)}" for vehicle in config.vehicles),
+        *([_EVERY_VEHICLE] if config.hears_mavlink and not config.vehicles else []),
+        *(f"hardware: {_interface(interface)}" for interface in config.interfaces),
+        f"identity: {_identity(config)}",
+        *_options(config.hardware),
+        f"requests: {_REQUESTS[config.requests]}",
+        *([f"signing: {_signing(config.signing)}"] if config.signing else []),
+        *([f"coalesce: input gathers for {config.coalesce * 1000:g} ms before it is read"] if config.coalesce else []),
+        *(f"controller {controller.name}: {_controller(controller)}" for controller in config.controllers),
+        *([] if config.controllers else ["controller: the default one for each handle"]),
+    ]
+
+
+_EVERY_VEHICLE = "vehicle: every autopilot that is heard, each with a handle of its own"
+_REQUESTS = {
+    "missing": "messages that are needed and do not come are asked for",
+    "none": "nothing is asked of the autopilot",
+}
+_UNSIGNED = {
+    "none": "nothing is taken unsigned",
+    "radio_status": "nothing but RADIO_STATUS is taken unsigned",
+    "all": "everything is taken unsigned too, so nothing that comes in is protected",
+}
+
+
+def _link(link: LinkConfig) -> str:
+    return url.parse(link.url).words() + (" (passive: nothing is sent there)" if link.passive else "")
+
+
+def _vehicle(vehicle: VehicleConfig) -> str:
+    who = (
+        f"system {vehicle.system}" if vehicle.system is not None else "the first system heard that no other entry names"
+    )
+    which = f"component {vehicle.component}" if vehicle.component is not None else "any autopilot component"
+    return f"{who}, {which} -> handle '{vehicle.handle}'"
+
+
+def _interface(interface: HardwareConfig) -> str:
+    options = ", ".join(f"{key}: {_value(value)}" for key, value in interface.options.items()) or "no options"
+    return f"'{interface.name}' of type {interface.type} ({options})"
+
+
+def _identity(config: Config) -> str:
+    identity = config.identity
+    system = f"system {identity.system}" if identity.system is not None else "the vehicle's own system"
+    heartbeat = "with" if identity.heartbeat else "without"
+    return f"{system}, component {identity.component}, {heartbeat} a HEARTBEAT of its own"
+
+
+def _signing(signing: SigningConfig) -> str:
+    return (
+        f"with the key in {signing.key_file}, link ids from {signing.link_id} on; {_UNSIGNED[signing.accept_unsigned]}"
+    )
+
+
+def _options(options: HardwareOptions) -> Iterator[str]:
+    """The options that differ from their defaults."""
+    default = HardwareOptions()
+    for option in fields(options):
+        value, usual = getattr(options, option.name), getattr(default, option.name)
+        if value != usual:
+            yield f"hardware: {option.name} = {_value(value)} (default {_value(usual)})"
+
+
+def _value(value: object) -> str:
+    if isinstance(value, dict):
+        return (
+            ", ".join(
+                f"{key}: {{{_value(item)}}}" if isinstance(item, dict) else f"{key}: {_value(item)}"
+                for key, item in value.items()
+            )
+            or "none"
+        )
+    if isinstance(value, frozenset):
+        return ", ".join(sorted(value)) or "none"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return getattr(value, "name", None) or str(value)
+
+
+def _controller(controller: ControllerConfig) -> str:
+    if controller.type not in OUR_TYPES:
+        return f"type {controller.type}, which checks its own parameters ({', '.join(controller.parameters) or 'none'})"
+    rate = controller.parameters.get("publish_rate", 10)
+    when = [f"at {rate} Hz"] if isinstance(rate, int | float) and rate > 0 else []
+    when += ["on change"] if controller.parameters.get("publish_on_change", True) else []
+    outputs = (
+        "the default publisher" if controller.publishers is None else ", ".join(p.type for p in controller.publishers)
+    )
+    handle = controller.parameters.get("handle_name", DEFAULT_HANDLE_NAME)
+    return f"handle '{handle}' {' and '.join(when) or 'never'} to {outputs or 'nobody'}"

@@ -1,0 +1,1 @@
+"""Explains the value of each field, and why there is no status."""

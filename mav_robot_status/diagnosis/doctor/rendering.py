@@ -1,0 +1,132 @@
+"""The output of `doctor`: text and JSON."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from ...hardware.mavlink.identity import named
+from ...mavlink import definitions as mav
+from ...mavlink.counters import OTHER_IDS
+from ...mavlink.enumerations import MAV_AUTOPILOT_PX4
+from .advice import listed, named_all
+from .findings import GROUND_STATION
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from .diagnosis import Diagnosis
+    from .findings import Findings, Speaker
+
+FEW_SOURCES = 4
+"""Limit of addresses in the text. The JSON has all."""
+
+
+def as_text(f: Findings, diagnosis: Diagnosis) -> str:
+    """The diagnosis, the remarks and the next action."""
+    lines = [f"{f.words}: {diagnosis.matter} [{diagnosis.cause}]"]
+    lines += [f"  {line}" for line in remarks(f)]
+    return "\n".join([*lines, f"next: {diagnosis.next}"])
+
+
+def as_json(f: Findings, diagnosis: Diagnosis) -> str:
+    """The same as a JSON object. Members and causes are stable; the wording of `found` and `next` is not."""
+    c = f.counters
+    return json.dumps(
+        {
+            "connection": f.url.text,
+            "cause": diagnosis.cause,
+            "ok": diagnosis.ok,
+            "found": [diagnosis.matter, *remarks(f)],
+            "next": diagnosis.next,
+            "seconds": f.seconds,
+            "bytes": f.size,
+            "frames": c.frames,
+            "frames_v1": c.frames_v1,
+            "signed": c.signed,
+            "lost": c.lost,
+            "loss_percent": round(f.loss, 1),
+            "bad_crc": _by_id(c.bad_crc),
+            "unknown": _by_id(c.unknown),
+            "incompatible": c.incompatible,
+            "garbage_bytes": c.garbage_bytes,
+            "dropped": f.dropped,
+            "sources": f.sources,
+            "speakers": [_speaker(s) for s in f.speakers],
+        }
+    )
+
+
+def remarks(f: Findings) -> Iterator[str]:
+    """Further findings that may help."""
+    if f.size:
+        yield from _traffic(f)
+    for vehicle in f.vehicles:
+        yield from _vehicle(vehicle)
+    others = tuple(s for s in f.speakers if s.status is None)
+    if others:
+        yield f"also heard: {named_all(others)}"
+    if any(s.autopilot == MAV_AUTOPILOT_PX4 for s in f.vehicles) and not any(
+        s.type == GROUND_STATION for s in f.speakers
+    ):
+        yield "no ground station is heard here: PX4 sends texts only to one, so causes have no text"
+
+
+def _traffic(f: Findings) -> Iterator[str]:
+    """Bytes and frames, their sources, and the faults that occurred."""
+    c = f.counters
+    shown = [*f.sources[:FEW_SOURCES], *(["..."] if len(f.sources) > FEW_SOURCES else [])]
+    sources = f" from {', '.join(shown)}" if shown else ""
+    lost = f"{f.loss:.1f} % of the sequence numbers are missing"
+    yield f"{f.size} bytes, {c.frames} MAVLink frames in {f.seconds:.1f} s{sources}; {lost}"
+    if c.bad_crc:
+        yield f"bad CRC: {listed(c.bad_crc)}"
+    if c.unknown:
+        yield f"unknown ids, not needed for a status: {listed(c.unknown)}"
+    if c.frames and c.garbage_bytes:
+        yield f"{c.garbage_bytes} bytes between the frames are not MAVLink"
+    if c.incompatible:
+        yield f"{c.incompatible} frames have unknown flags"
+
+
+def _vehicle(s: Speaker) -> Iterator[str]:
+    if s.status is None:
+        return
+    kind = named(mav.AUTOPILOT_NAMES, s.autopilot or 0), named(mav.TYPE_NAMES, s.type or 0)
+    yield f"vehicle {s.ids}: {', '.join(kind)}, flight mode {s.status.flight_mode or 'unknown'}"
+    yield "rates: " + ", ".join(
+        f"{name} {'once' if hz is None else f'{hz:g} Hz'}" for name, hz in s.wanted.items() if hz != 0
+    )
+    if s.missing:
+        yield f"missing: {', '.join(s.missing)}"
+    yield "status: " + ", ".join(f"{name} {_word(value)}" for name, value in s.status.fields.items())
+    for what, names in (("errors", s.status.errors), ("inhibits", s.status.inhibits)):
+        if names:
+            yield f"{what}: {', '.join(names)}"
+
+
+def _word(value: str | bool | None) -> str:
+    return "UNKNOWN" if value is None else str(value).upper()
+
+
+def _by_id(counts: Mapping[int, int]) -> dict[str, int]:
+    """Counts by message id; `other` for ids beyond the first 256."""
+    return {"other" if i == OTHER_IDS else str(i): n for i, n in sorted(counts.items())}
+
+
+def _speaker(s: Speaker) -> dict[str, Any]:
+    return {
+        "system": s.system,
+        "component": s.component,
+        "autopilot": None if s.autopilot is None else named(mav.AUTOPILOT_NAMES, s.autopilot),
+        "type": None if s.type is None else named(mav.TYPE_NAMES, s.type),
+        "frames": s.frames,
+        "status": s.status
+        and {
+            "flight_mode": s.status.flight_mode,
+            **s.status.fields,
+            "errors": s.status.errors,
+            "inhibits": s.status.inhibits,
+        },
+        "rates": s.wanted if s.status else {},
+    }

@@ -1,0 +1,145 @@
+"""`explain`: each field with its value, the rule that applied, the source message and its age."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING, Any, Final
+
+from ..clock import Instant, later, rfc3339
+from ..clock import now as present
+from ..errors import UsageError
+from ..gateway.controller_config import DEFAULT_CONTROLLER
+from ..gateway.event_loop import EventLoop
+from ..gateway.recorded_log import Recording
+from ..gateway.replay import ReplayPipeline, run_through
+from ..interface import LinkState
+from ..interface.explanation import explanation
+from ..streams import NO_OUTPUT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from typing import TextIO
+
+    from ..config import Config
+    from ..interface import HardwareInterface, IndustrialRobotStatusHandle
+    from ..links.log import Stamped
+
+LISTEN: Final = 5.0
+"""Seconds from the first heartbeat to the explanation of a live link. Slow streams arrive twice in this time."""
+PATIENCE: Final = 30.0  # s to wait for the first heartbeat
+
+
+def explain_log(config: Config, path: str, at: str | None) -> list[dict[str, Any]]:
+    """The explanations at a time in a log, by default at its end.
+
+    `at` is an RFC 3339 time, or `+44` for seconds after the first record. Raises UsageError if the log lacks it.
+    """
+    pipeline = ReplayPipeline(silent(config), NO_OUTPUT)
+    end = run_through(pipeline, _up_to(Recording(path), at))
+    return explanations(pipeline.hw, end)
+
+
+def _up_to(recording: Iterable[Stamped], at: str | None) -> Iterator[Stamped]:
+    """The recording up to a time, which becomes its last instant."""
+    until: int | None = None
+    last: Instant | None = None
+    for stamped in recording:
+        now = stamped[0]
+        if last is None and at is not None:
+            until = moment(at, now.unix_us)
+            if until < now.unix_us:
+                raise UsageError(f"--at {at}: the log begins at {rfc3339(now.unix_us)}")
+        if last is not None and until is not None and now.unix_us > until:
+            yield later(last, (until - last.unix_us) / 1e6), None, False
+            return
+        yield stamped
+        last = now
+    if last is not None and until is not None and until > last.unix_us:
+        raise UsageError(f"--at {at}: the log ends at {rfc3339(last.unix_us)}")
+
+
+def explain_live(config: Config, stdout: TextIO, clock: Callable[[], Instant] = present) -> list[dict[str, Any]]:
+    """The explanations of the vehicles on live links, LISTEN seconds after the first heartbeat."""
+    gateway = EventLoop(silent(config), stdout)
+    gateway.stop_on_signals()
+    start = clock().mono
+    heard: list[float] = []
+
+    def enough() -> bool:
+        now = clock().mono
+        if not heard and any(map(_is_heard, gateway.pipeline.hw.handles)):
+            heard.append(now)
+        return now - heard[0] >= LISTEN if heard else now - start >= PATIENCE
+
+    gateway.run(until=enough)
+    return explanations(gateway.pipeline.hw, clock())
+
+
+def silent(config: Config) -> Config:
+    """The configuration without publishers: the explanation is the only output."""
+    return dataclasses.replace(config, controllers=(dataclasses.replace(DEFAULT_CONTROLLER, publishers=()),))
+
+
+def moment(at: str, start_us: int) -> int:
+    """A time in a log, in Unix microseconds. Raises UsageError if it is not a time or `+seconds`."""
+    try:
+        if at.startswith("+"):
+            return start_us + round(float(at) * 1e6)
+        # Python 3.10 accepts only three or six decimals
+        six = re.sub(r"\.(\d{1,6})\d*", lambda match: f".{match[1]:0<6}", at)
+        time = datetime.fromisoformat(six.replace("Z", "+00:00"))
+    except (ValueError, OverflowError):
+        raise UsageError(
+            f"--at {at}: write a time like {rfc3339(start_us)}, or +44 for seconds from the start"
+        ) from None
+    if time.tzinfo is None:
+        time = time.replace(tzinfo=timezone.utc)
+    return round(time.timestamp() * 1e6)
+
+
+def explanations(hw: HardwareInterface, now: Instant) -> list[dict[str, Any]]:
+    """One explanation for each robot heard."""
+    heard = list(filter(_is_heard, hw.handles))
+    for handle in heard:
+        hw.explain(handle.name, now)
+    return [explanation(handle, now) for handle in heard]
+
+
+def _is_heard(handle: IndustrialRobotStatusHandle) -> bool:
+    return handle.detail.link is not LinkState.NEVER_SEEN
+
+
+def as_json(found: Iterable[dict[str, Any]]) -> str:
+    """The explanations as JSON, one object per line."""
+    return "\n".join(json.dumps(one) for one in found)
+
+
+def as_table(found: Iterable[dict[str, Any]]) -> str:
+    """The explanations as tables for a person."""
+    return "\n\n".join("\n".join(_table(one)) for one in found)
+
+
+def _table(one: dict[str, Any]) -> Iterator[str]:
+    vehicle, link = one["vehicle"], one["link"]
+    kind = ", ".join(str(v) for v in (vehicle["autopilot"], vehicle["type"], vehicle["flight_mode"]) if v is not None)
+    yield f"vehicle {one['system']}.{one['component']} ({kind}), {link['state']}, at {one['stamp']}"
+    rows = [("field", "value", "age", "why")]
+    for name, field in one["fields"].items():
+        value = {True: "TRUE", False: "FALSE", None: "UNKNOWN"}.get(field["value"], field["value"])
+        age = "" if field["age"] is None else f"{field['age']:.1f} s"
+        why = field["rule"] or ""
+        rows.append((name, str(value), age, f"{why}  [{field['source']}]" if field["source"] else why))
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    for row in rows:
+        yield "  ".join((row[0].ljust(widths[0]), row[1].ljust(widths[1]), row[2].rjust(widths[2]), row[3]))
+    for error in one["errors"]:
+        yield f"error    {error['code']} {error['name']} since {error['since']}{_said(error['text'])}"
+    for inhibit in one["inhibits"]:
+        yield f"inhibit  {inhibit['name']} since {inhibit['since']}{_said(inhibit['text'])}"
+
+
+def _said(text: str | None) -> str:
+    return f': "{text}"' if text else ""

@@ -1,0 +1,68 @@
+"""Replays a recorded log, and shows the handles to a viewer after each tick."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from ..gateway.observer import Observer
+from ..gateway.recorded_log import Recording
+from ..gateway.replay import ReplayPipeline, run_through
+from ..interface import LinkState
+from ..streams import NO_OUTPUT
+from .explain import silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from ..clock import Instant
+    from ..config import Config
+    from ..interface import IndustrialRobotStatusHandle, IndustrialRobotStatusInterface
+    from ..links.log import Stamped
+
+
+class Viewer(Protocol):
+    """Collects the statuses of a log, for a report."""
+
+    def begin(self, now: Instant) -> None:
+        """The log begins, or a new segment after a clock jump."""
+
+    def sample(self, handles: Iterable[IndustrialRobotStatusHandle], now: Instant) -> None:
+        """The handles of the vehicles heard so far may have changed."""
+
+    def end(self, now: Instant) -> None:
+        """The log ends."""
+
+
+def watch(config: Config, path: str, viewer: Viewer, progress: Callable[[float], None]) -> str:
+    """Show the log at `path` to `viewer`, and report the fraction read (0 to 1) to `progress`.
+
+    Returns a summary line of the log. Raises UsageError if the log cannot be read.
+    """
+    recording = Recording(path)
+    pipeline = ReplayPipeline(silent(config), NO_OUTPUT, observers=[_Look(viewer)])
+    viewer.end(run_through(pipeline, _segments(recording, viewer, progress)))
+    return recording.summary()
+
+
+def _segments(recording: Recording, viewer: Viewer, progress: Callable[[float], None]) -> Iterator[Stamped]:
+    """The recording. Notifies the viewer at the start of each segment."""
+    first = True
+    for stamped in recording:
+        now, _, new_segment = stamped
+        if first or new_segment:
+            viewer.begin(now)
+            first = False
+        yield stamped
+        progress(recording.share)
+
+
+class _Look(Observer):
+    """Shows the handles of the vehicles heard so far to a viewer."""
+
+    def __init__(self, viewer: Viewer) -> None:
+        self._viewer = viewer
+        self._heard: set[str] = set()
+
+    def on_tick(self, handles: IndustrialRobotStatusInterface, now: Instant) -> None:
+        self._heard |= {handle.name for handle in handles if handle.detail.link is not LinkState.NEVER_SEEN}
+        self._viewer.sample([handle for handle in handles if handle.name in self._heard], now)

@@ -1,0 +1,201 @@
+"""The MAVLink hardware interface on live links: connects `MavlinkRobotHW` to a `LinkHub`.
+
+It sends our heartbeat and the requests for missing messages, and logs while no autopilot is heard.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import TYPE_CHECKING, Final
+
+from ..hardware.mavlink.interface import MavlinkRobotHW
+from ..hardware.mavlink.vehicle import ExpectedVehicle
+from ..mavlink.commands import ROBOT_STATUS
+from .controller_config import publishes
+from .link_hub import LinkHub
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ..clock import Instant
+    from ..config import Config
+    from ..hardware.mavlink.requests.scheduler import Ask
+    from ..interface import IndustrialRobotStatusInterface, IoSource
+    from ..mavlink.framing import Frame
+    from .endpoint import Channel, Endpoint
+    from .observer import Observer
+
+log = logging.getLogger(__name__)
+
+AT_ONCE: Final = -math.inf
+HEARTBEAT_PERIOD: Final = 1.0  # s
+FIRST_SILENCE, LATER_SILENCE = 3.5, 30.0  # s without an autopilot until the first log line, and between later ones
+
+
+def robot_hw(config: Config) -> MavlinkRobotHW:
+    """The vehicles of a configuration, in the state before the first heartbeat."""
+    slots = [ExpectedVehicle(v.system, v.component, v.handle) for v in config.vehicles]
+    vehicles = MavlinkRobotHW(config.hardware, slots, config.identity.component)
+    vehicles.speak_as(config.identity.system, config.identity.component)
+    return vehicles
+
+
+class MavlinkHardware:
+    """A `HardwareInterface`: the vehicles on the links of a configuration. Each link is a source."""
+
+    def __init__(self, config: Config, clock: Callable[[], Instant], observers: Sequence[Observer] = ()) -> None:
+        """Open the links. Raises LinkError, UsageError."""
+        self.hub = LinkHub(config, clock, observers)
+        self.vehicles = robot_hw(config)
+        self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
+        self.changed = False
+        self.observers = observers
+        self._heartbeat_due = math.inf
+        self._timer_due = AT_ONCE
+        """The first of `_heartbeat_due` and `_silent_at`."""
+        self._silent_at = clock().mono + FIRST_SILENCE
+        self._configure(config)
+
+    def _configure(self, config: Config) -> None:
+        self._config = config
+        self.vehicles.asks = config.requests == "missing" and not all(link.passive for link in config.links)
+        if not config.identity.heartbeat:
+            self._heartbeat_due = math.inf
+        elif self._heartbeat_due == math.inf:
+            self._heartbeat_due = AT_ONCE
+        self._timer_due = AT_ONCE
+        if publishes(config, "mavlink"):
+            self.hub.offered |= {ROBOT_STATUS}
+        self._sources = tuple(LinkSource(endpoint, self) for endpoint in self.hub.endpoints)
+
+    # reload
+
+    def change(self, config: Config) -> None:
+        """Open and close links for this configuration, and forget the vehicles heard only on closed links.
+
+        Afterwards call `read`, publish the last statuses, and call `renew`. Raises LinkError, UsageError. After an
+        error some links are closed: change back.
+        """
+        self.hub.change(config)
+        self.vehicles.forget(frozenset(self.hub.paths.vehicles()))
+        self.vehicles.changed = True
+        self._configure(config)
+
+    def renew(self) -> None:
+        """Use the vehicles and options of the new configuration. Vehicles in both keep their state."""
+        before, self.vehicles = self.vehicles, robot_hw(self._config)
+        self.vehicles.adopt(before)
+        self.vehicles.asks = before.asks
+        self.handles = self.vehicles.handles
+
+    # receiving
+
+    def sources(self) -> Sequence[IoSource]:
+        """The links."""
+        return self._sources
+
+    def observe(self, heard: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
+        """Pass the frames of vehicles to the observers."""
+        for observer in self.observers:
+            for frame, _ in heard:
+                if self.vehicles.find(*frame.ids) is not None:
+                    observer.on_frame(frame, now)
+
+    # a turn
+
+    def read(self, now: Instant) -> None:
+        """Update the handles to `now`."""
+        hub, vehicles = self.hub, self.vehicles
+        hub.needs_turn = False
+        while hub.conflicts:
+            vehicles.conflict(hub.conflicts.pop(), now)
+        vehicles.read(now)
+        if vehicles.changed:
+            vehicles.changed, self.changed = False, True
+
+    def write(self, now: Instant) -> None:
+        """Send the due requests and heartbeats."""
+        if self.vehicles.asks:
+            for ask in self.vehicles.due_requests(now, self.hub.passive_vehicles()):
+                self._send(ask)
+        if self.hub.sender.signing_policy is not None:
+            self.hub.sender.signing_policy.keep()
+        if now.mono >= self._timer_due:
+            self._serve_timers(now.mono)
+
+    def _send(self, request: Ask) -> None:
+        path = self.hub.paths.channel((request.system, request.component))
+        if path is not None:
+            # the autopilot acknowledges to these ids
+            self.vehicles.speak_as(self._config.identity.system, self.hub.sender.component.id)
+            self.hub.send_to(path, request.message, request.system)
+
+    def _serve_timers(self, now: float) -> None:
+        if now >= self._heartbeat_due:
+            late = now - self._heartbeat_due > HEARTBEAT_PERIOD
+            self._heartbeat_due = (now if late else self._heartbeat_due) + HEARTBEAT_PERIOD
+            self.hub.send_heartbeats(self.vehicles.vehicles, now)
+        if now >= self._silent_at:
+            self._log_silence(now)
+        self._timer_due = min(self._heartbeat_due, self._silent_at)
+
+    def _log_silence(self, now: float) -> None:
+        if any(self.vehicles.vehicles):
+            self._silent_at = math.inf
+            return
+        self._silent_at = now + LATER_SILENCE
+        self.hub.log_silence()
+
+    def next_due(self, until: float = -math.inf) -> float:
+        """When there is something to do. At once (-inf) after a frame that may change a status."""
+        if self.hub.needs_turn:
+            return AT_ONCE
+        due = self.vehicles.next_due(until)
+        return due if due < self._timer_due else self._timer_due
+
+    def explain(self, handle: str, now: Instant) -> None:
+        """Update the evidence in this handle to `now`."""
+        self.vehicles.explain(handle, now)
+
+    def forget(self) -> None:
+        """Forget all vehicles."""
+        self.vehicles.forget()
+
+    def close(self) -> None:
+        """Close the links, and log the counters."""
+        for vehicle in self.vehicles.vehicles:
+            if vehicle.losses and vehicle.ids is not None:
+                times = "once" if vehicle.losses == 1 else f"{vehicle.losses} times"
+                log.info("vehicle %d.%d was lost %s", *vehicle.ids, times)
+        self.hub.close()
+
+
+class LinkSource:
+    """One link of a hub, as a source."""
+
+    __slots__ = ("_endpoint", "_hardware", "_hub", "close", "fileno", "next_due")
+
+    def __init__(self, endpoint: Endpoint, hardware: MavlinkHardware) -> None:
+        self._endpoint = endpoint
+        self._hardware = hardware
+        self._hub = hardware.hub
+        self.fileno, self.next_due, self.close = endpoint.link.fileno, endpoint.link.due, endpoint.link.close
+
+    def receive(self, now: Instant, limit: int) -> None:
+        """Read the pending input, and process its frames."""
+        heard = self._hub.receive(self._endpoint, now, limit)
+        if not heard:
+            return
+        hardware = self._hardware
+        take = hardware.vehicles.take
+        for frame, channel in heard:
+            vehicle = take(frame, now)
+            if vehicle is not None and vehicle.ids is not None:
+                self._hub.heard_vehicle(vehicle.ids, channel, now.mono)
+        if hardware.observers:
+            hardware.observe(heard, now)
+
+    def service(self, now: Instant) -> None:
+        """Connect or reconnect."""
+        self._endpoint.link.service(now.mono)

@@ -1,0 +1,235 @@
+"""One turn of the gateway: read the hardware, update the controllers, serve the publishers. No clock, no socket.
+
+A live gateway and a replay use the same pipeline, so both write the same lines.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any, Final, TextIO
+
+from ..clock import Instant
+from ..controller import IndustrialRobotStatusController
+from ..errors import ConfigError, MavRobotStatusError
+from ..interface import InterfaceManager, LinkState, PublisherContext
+from ..interface.explanation import explanation
+from . import plugins
+from .controller_config import (
+    DEFAULT_CONTROLLER,
+    check,
+    check_handles,
+    handle_name,
+    has_no_durable_publisher,
+    is_default,
+    is_durable,
+    is_live_only,
+    publisher_key,
+    publishers_of,
+)
+from .guarded_controller import GuardedController
+from .guarded_publisher import GuardedPublisher
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from ..config import Config, ControllerConfig, PublisherConfig
+    from ..interface import HardwareInterface, MavlinkPort, Metrics, Publisher
+    from .observer import Observer
+
+NEVER: Final = Instant(0.0, 0)
+"""The time of a pipeline that has not run yet."""
+
+
+class Pipeline:
+    """Reads the hardware, and publishes the statuses in its handles."""
+
+    def __init__(
+        self,
+        config: Config,
+        hw: HardwareInterface,
+        port: MavlinkPort,
+        stdout: TextIO,
+        *,
+        patient: bool = False,
+        metrics: Callable[[Instant], Metrics] | None = None,
+        observers: Sequence[Observer] = (),
+    ) -> None:
+        """Make the controllers and publishers. Raises ConfigError if one of them cannot be made.
+
+        `metrics` is passed to the publishers, see `PublisherContext`.
+        """
+        self.hw = hw
+        self._context = PublisherContext({}, port, stdout, patient, self.explain, metrics)
+        self.publishers: dict[tuple[str, str], Publisher] = {}
+        self._observers = observers
+        self._service_due = math.inf
+        self.now = NEVER
+        """The instant of the last tick."""
+        with ExitStack() as undo:
+            undo.callback(self._close_publishers)
+            self._configure(config)
+            undo.pop_all()
+
+    def _configure(self, config: Config) -> None:
+        """Make the controllers and publishers of a configuration. Publishers that exist are kept."""
+        check(config)
+        self._named = set(self.hw.handles.get_names())
+        """Handles that are published from the start, before a message of their robot arrives."""
+        check_handles(config, self._named)
+        self._interfaces = InterfaceManager()
+        self._interfaces.register_interface(self.hw.handles)
+        self._configs = sorted(config.controllers or (DEFAULT_CONTROLLER,), key=has_no_durable_publisher)
+        self._controllers: list[GuardedController] = []
+        self._idle: list[GuardedController] = []
+        """The controllers that do not run."""
+        self._controllers_due = math.inf
+        self._seen: set[str] = set()
+        for controller in self._configs:  # before the first heartbeat, so that a faulty output fails at the start
+            self._publishers(controller)
+        self._serve_new_handles()
+
+    def change(self, config: Config, renewed: Callable[[], HardwareInterface], now: Instant) -> None:
+        """Apply another configuration. Publishers that are in both configurations are kept.
+
+        Before this call the hardware forgets the robots that the new configuration lacks. `change` publishes a last
+        status of them, and then calls `renewed` for the new hardware. Raises as the constructor does. After an error
+        some parts are closed: change back.
+        """
+        check(config)
+        self.tick(now)
+        self._stop(now)
+        kept = {publisher_key(p) for c in config.controllers or (DEFAULT_CONTROLLER,) for p in publishers_of(c)}
+        for key in self.publishers.keys() - kept:  # first close, then open: a new publisher may use the same port
+            self.publishers.pop(key).close()
+        self.hw = renewed()
+        self._configure(config)
+
+    def explain(self, handle: str, now: Instant) -> dict[str, Any] | None:
+        """Why each field of a handle has its value. None for an unknown handle, and for a robot never heard."""
+        if handle not in self.hw.handles.get_names():
+            return None
+        self.hw.explain(handle, now)
+        found = self.hw.handles.get_handle(handle)
+        return None if found.detail.link is LinkState.NEVER_SEEN else explanation(found, now)
+
+    def skipped(self, publisher: Publisher) -> int:
+        """Messages that were due while this publisher was busy. Only our own controllers count them."""
+        found = (guarded.controller for guarded in self._controllers)
+        ours = (controller for controller in found if isinstance(controller, IndustrialRobotStatusController))
+        return sum(controller.skipped(publisher) for controller in ours)
+
+    def tick(self, now: Instant) -> None:
+        """Read the hardware, update the controllers that are due or whose handle has changed, serve the publishers."""
+        self.hw.read(now)
+        self._serve_new_handles()
+        self.now = now
+        if self._idle or self.hw.changed or now.mono >= self._controllers_due:
+            self._update(now)
+        self._service_due = math.inf
+        for publisher in self.publishers.values():
+            again = publisher.service(now)
+            if again is not None:
+                self._service_due = min(self._service_due, again)
+        for observer in self._observers:
+            observer.on_tick(self.hw.handles, now)
+
+    def next_due(self, now: float, until: float = -math.inf) -> float:
+        """When (monotonic seconds) `tick` has something to do, unless a frame arrives first.
+
+        `until` is passed to `HardwareInterface.next_due`.
+        """
+        if self.hw.changed or (self._idle and any(map(self._may_start, self._idle))):
+            return now
+        return min(self.hw.next_due(until), self._service_due, self._controllers_due)
+
+    def forget(self, now: Instant) -> None:
+        """Return to the state at the start: no robot was heard."""
+        self._stop(now)
+        self.hw.forget()
+
+    def close(self, now: Instant) -> None:
+        """Stop the controllers, close the publishers."""
+        try:
+            self._stop(now)
+        finally:
+            self._close_publishers()
+
+    def _close_publishers(self) -> None:
+        with ExitStack() as steps:  # close all, even if one raises
+            for publisher in self.publishers.values():
+                steps.callback(publisher.close)
+
+    def _stop(self, now: Instant) -> None:
+        for controller in self._controllers:
+            if controller.running:
+                controller.stop(now)
+        self._idle, self._controllers_due = list(self._controllers), math.inf
+
+    def _update(self, now: Instant) -> None:
+        self.hw.changed = False
+        for controller in filter(self._may_start, self._idle):
+            controller.start(now)
+        self._idle = [controller for controller in self._idle if not controller.running]
+        for controller in self._controllers:
+            if controller.running:
+                controller.update(now)
+        self._controllers_due = min((controller.due for controller in self._controllers), default=math.inf)
+
+    def _may_start(self, controller: GuardedController) -> bool:
+        handle = controller.handle
+        return handle.name in self._named or handle.detail.link is not LinkState.NEVER_SEEN
+
+    def _serve_new_handles(self) -> None:
+        """Make the controllers of handles that were registered since the last call."""
+        if len(self.hw.handles) == len(self._seen):
+            return
+        for name in self.hw.handles.get_names():
+            if name in self._seen:
+                continue
+            self._seen.add(name)
+            for controller in self._configs:
+                if is_default(controller):
+                    parameters = {**controller.parameters, "handle_name": name}
+                    self._add_controller(dataclasses.replace(controller, parameters=parameters))
+                elif handle_name(controller) == name:
+                    self._add_controller(controller)
+
+    def _add_controller(self, config: ControllerConfig) -> None:
+        """Raises ConfigError if the controller cannot be made."""
+        make = plugins.load(plugins.CONTROLLERS, config.type, config.where)
+        publishers = self._publishers(config)
+        with _as_config_error(f"{config.where}: controller '{config.name}'"):
+            controller = make()
+            controller.init(self._interfaces, config.parameters, publishers)
+            self._controllers.append(GuardedController(config.name, controller, controller.handle))
+            self._idle.append(self._controllers[-1])
+
+    def _publishers(self, config: ControllerConfig) -> list[Publisher]:
+        """The publishers of a controller, durable ones first. A replay leaves out those that are `live_only`."""
+        wanted = [p for p in publishers_of(config) if not (self._context.patient and is_live_only(p, config.where))]
+        wanted.sort(key=lambda p: not is_durable(p, config.where))
+        return [self._publisher(p, config.where) for p in wanted]
+
+    def _publisher(self, config: PublisherConfig, where: str) -> Publisher:
+        """The existing publisher, or a new one."""
+        key = publisher_key(config)
+        if key not in self.publishers:
+            make: Callable[[PublisherContext], Publisher] = plugins.load(plugins.PUBLISHERS, config.type, where)
+            with _as_config_error(f"{where}: publisher '{config.type}'"):
+                made = make(self._context._replace(options=config.options))
+            trusted = plugins.is_part_of_this_package(made)
+            self.publishers[key] = made if trusted else GuardedPublisher(made, config.type)
+        return self.publishers[key]
+
+
+@contextmanager
+def _as_config_error(what: str) -> Iterator[None]:
+    """Raise ConfigError for every exception of a third party's constructor."""
+    try:
+        yield
+    except MavRobotStatusError:
+        raise
+    except Exception as error:
+        raise ConfigError(f"{what} cannot be made: {type(error).__name__}: {error}") from error

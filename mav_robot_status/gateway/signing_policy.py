@@ -1,0 +1,65 @@
+"""Signing on our links: signs what we send, and decides which received frames are accepted."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import TYPE_CHECKING, Final
+
+from ..mavlink.signing import WORDS, Signer, Verdict, Verifier
+from .signing_keys import StampStore, read_key, stamp_path
+
+if TYPE_CHECKING:
+    from ..clock import Instant
+    from ..config import SigningConfig
+    from ..mavlink.framing import Frame
+
+log = logging.getLogger(__name__)
+
+HEALING_PERIOD: Final = 1.0
+"""Seconds between two of our heartbeats to an autopilot whose time stamps are behind."""
+
+
+class SigningPolicy:
+    """One key, time stamp and list of streams for all links, so that no frame can be replayed on another link."""
+
+    def __init__(self, config: SigningConfig, now: Instant) -> None:
+        """Read the key. Raises UsageError if it cannot be read."""
+        key = read_key(config.key_file)
+        self._store = StampStore(stamp_path(key))
+        self._signer = Signer(key, config.link_id, self._store.start(now.unix_us))
+        self._verifier = Verifier(self._signer, config.accept_unsigned)
+        self._heal_at = -math.inf
+
+    def sign(self, frame: bytes, unix_us: int, link: int) -> bytes:
+        """Our frame with a signature. `link` is the number of the link, from 0."""
+        return self._signer.sign(frame, unix_us, link)
+
+    def judge(self, frame: Frame, now: Instant) -> Verdict:
+        """The verdict on a received frame. A command needs VERIFIED."""
+        return self._verifier.judge(frame, now.unix_us)
+
+    def may_heal(self, verdict: Verdict, now: float) -> bool:
+        """Whether to answer a heartbeat with ours, from which an autopilot with an old time stamp sets its own.
+
+        ArduPilot's time stamps follow GPS time. Without GPS they continue from the last one before power-off.
+        """
+        if verdict is not Verdict.STALE or now - self._heal_at < HEALING_PERIOD:
+            return False
+        self._heal_at = now
+        return True
+
+    def keep(self) -> None:
+        """Write the time stamp to disk if it is due. Called in every turn."""
+        self._store.keep(self._signer.stamp)
+
+    def summary(self) -> str:
+        """The verdicts that occurred, with their counts, as text."""
+        counters = self._verifier.counters
+        return ", ".join(f"{number} {WORDS[verdict]}" for verdict, number in counters.items() if number)
+
+    def close(self) -> None:
+        """The last call: write the time stamp, log the counters."""
+        self._store.close(self._signer.stamp)
+        if found := self.summary():
+            log.info("signing: %s", found)

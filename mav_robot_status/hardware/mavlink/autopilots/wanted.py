@@ -1,0 +1,44 @@
+"""The messages that a status needs, with their rates, for use in the profiles."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from ....mavlink import definitions as mav
+from ....mavlink import enumerations as mavlink
+
+
+class Wanted(NamedTuple):
+    """One message that a status needs."""
+
+    id: int
+    name: str
+    rate: float
+    """Hz."""
+    size: int
+    """Bytes of a complete MAVLink 2 frame."""
+    instead: int | None = None
+    """A message that replaces it."""
+
+
+def wanted(message_id: int, rate: float, instead: int | None = None) -> Wanted:
+    """A message at `rate` Hz."""
+    definition = mav.MESSAGES[message_id]
+    return Wanted(message_id, definition.name, rate, definition.size + 12, instead)
+
+
+COMMON: Final = (
+    wanted(mavlink.MAVLINK_MSG_ID_SYS_STATUS, 1.0),
+    wanted(mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 2.0),
+    wanted(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 4.0, instead=mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED),
+    wanted(mavlink.MAVLINK_MSG_ID_ATTITUDE, 4.0),
+    wanted(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, 1.0),
+)
+OUTPUT_WATCH: Final = (
+    wanted(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2.0),
+    wanted(mavlink.MAVLINK_MSG_ID_VFR_HUD, 2.0),
+)
+"""The additional messages for the output watch."""
+ESTIMATOR: Final = (wanted(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 0.5),)
+"""It is valid for ten seconds."""
+CURRENT_MODE: Final = (wanted(mavlink.MAVLINK_MSG_ID_CURRENT_MODE, 1.0),)

@@ -1,0 +1,105 @@
+"""Facts in, RobotStatus out: one pure function for each field.
+
+Invariants of every status (checked in `tests/`): I1 e_stopped TRUE => drives_powered FALSE. I2 drives_powered FALSE =>
+motion_possible FALSE. I3 error_code != 0 <=> in_error TRUE. I4 link stale => everything UNKNOWN, code 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from ...interface.fields import STATES
+from ...interface.status import Detail, LinkState, RobotStatus, Vehicle
+from ...mavlink.definitions import AUTOPILOT_NAMES, STATE_NAMES, TYPE_NAMES
+from . import causes
+from .identity import named
+from .rules.drives_powered import drives_powered, motion_possible
+from .rules.e_stopped import e_stopped
+from .rules.errors import active_errors, in_error
+from .rules.flight_mode import flight_mode
+from .rules.in_motion import in_motion
+from .rules.inhibits import inhibit, inhibits
+from .rules.reason import TRUE, Reason, Source
+
+if TYPE_CHECKING:
+    from ...clock import Instant
+    from .facts import Facts
+    from .options import HardwareOptions
+
+
+class Derived(NamedTuple):
+    """The values for a handle, with a reason for each field."""
+
+    status: RobotStatus
+    detail: Detail
+    reasons: Mapping[str, Reason]
+
+
+LOST: Final = Reason("no heartbeat within heartbeat_timeout", Source.HEARTBEAT)
+
+
+def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, options: HardwareOptions) -> Derived:
+    """The status of the vehicle with these (system, component) ids at `now`; `before` is the previous detail."""
+    if not facts.fresh.heartbeat:
+        return _lost(facts, ids, before, now, options)
+    mode = flight_mode(facts, options)
+    stopped, why_stopped = e_stopped(facts, options)
+    drives, why_drives = drives_powered(facts, options, stopped, why_stopped)
+    possible, why_possible = motion_possible(facts, options, mode, drives, why_drives)
+    moving, why_moving = in_motion(facts, options)
+    errors = active_errors(facts)
+    wrong, why_wrong = in_error(facts, errors)
+    status = RobotStatus(
+        mode=mode.mode,
+        e_stopped=stopped,
+        drives_powered=drives,
+        motion_possible=possible,
+        in_motion=moving,
+        in_error=wrong,
+        error_code=errors[0].cause.code if errors else 0,
+    )
+    detail = Detail(
+        system=ids[0],
+        component=ids[1],
+        errors=tuple(error.cause for error in errors),
+        inhibits=() if possible is TRUE else inhibits(facts, options, mode, stopped, before, now),
+        vehicle=_vehicle(facts)._replace(
+            flight_mode=mode.name,
+            custom_mode=facts.heartbeat.custom_mode,
+            state=named(STATE_NAMES, facts.heartbeat.system_status),
+        ),
+        link=LinkState.CONNECTED,
+    )
+    reasons = {
+        "mode": Reason(mode.rule, Source.MODE_NUMBER),
+        "e_stopped": why_stopped,
+        "drives_powered": why_drives,
+        "motion_possible": why_possible,
+        "in_motion": why_moving,
+        "in_error": why_wrong,
+    }
+    return Derived(status, detail, reasons)
+
+
+def _lost(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, options: HardwareOptions) -> Derived:
+    """I4: without a fresh heartbeat every field is UNKNOWN."""
+    status = RobotStatus()
+    detail = Detail(
+        system=ids[0],
+        component=ids[1],
+        inhibits=(inhibit("LINK_STALE", None, before, now),),
+        vehicle=_vehicle(facts),
+        link=LinkState.LOST,
+    )
+    if options.link_loss_is_error:
+        since = next((e.since_us for e in before.errors if e.code == causes.LINK_LOST), now.unix_us)
+        status = status._replace(in_error=TRUE, error_code=causes.LINK_LOST)
+        detail = detail._replace(errors=(causes.error(causes.LINK_LOST, None, since),))
+    return Derived(status, detail, dict.fromkeys((field.name for field in STATES), LOST))
+
+
+def _vehicle(facts: Facts) -> Vehicle:
+    """The part of the detail that stays valid while the link is lost."""
+    kind = facts.kind
+    return Vehicle(autopilot=named(AUTOPILOT_NAMES, kind.autopilot), type=named(TYPE_NAMES, kind.vehicle_type))

@@ -1,0 +1,159 @@
+"""The facts of a vehicle: the complete input of the rules. A new status is derived only when they change.
+
+`settle` makes them from the state. A rule can read nothing else, and every fact is compared. Times of arrival are not
+facts, because each message changes them; `evidence` reads them from the state.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from ...interface.status import TriState
+from ...mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
+
+if TYPE_CHECKING:
+    from ...mavlink.definitions import Heartbeat
+    from .autopilots import Autopilot
+    from .autopilots.modes import ModeHints
+    from .autopilots.profile import Version
+    from .identity import Family
+
+
+class Kind(NamedTuple):
+    """The kind of vehicle."""
+
+    profile: Autopilot
+    family: Family
+    vehicle_type: int
+    """MAV_TYPE."""
+    autopilot: int
+    """MAV_AUTOPILOT."""
+    version: Version | None
+    """The firmware version. None: unknown, or a build without a tag."""
+
+
+class Fresh(NamedTuple):
+    """Which messages are recent enough to be used."""
+
+    heartbeat: bool
+    sys_status: bool
+    landed_state: bool
+    velocity: str | None
+    """The name of the message that gives the speed."""
+    global_position: bool
+    gps: bool
+
+
+class Movement(NamedTuple):
+    """The motion according to speed and rotation."""
+
+    value: TriState
+    """With hysteresis."""
+    is_slow: bool
+    """Whether an unknown motion is below the lower thresholds, not yet for long enough."""
+    is_measured: bool
+    """Whether the latest sample is an estimate."""
+    moves_disarmed: bool
+    """Whether the estimate shows motion over ground while the vehicle is disarmed."""
+
+
+class Outputs(NamedTuple):
+    """The state of the motor outputs."""
+
+    fresh: bool
+    driven: bool
+    held: bool
+    """Whether they are held at their stop value, for long enough, while throttle is demanded."""
+    at_stop: bool
+    """Whether each is at its stop value: then a turning motor is not driven."""
+
+
+class Stop(NamedTuple):
+    """What the autopilot has reported about an emergency stop."""
+
+    said: TriState
+    text: str | None
+    is_ready: bool
+    """Whether the pre-arm checks, which fail while it is engaged, pass."""
+
+
+class SystemStatus(NamedTuple):
+    """The contents of the latest SYS_STATUS."""
+
+    safety_switch: bool
+    """Whether it shows that the safety switch holds the outputs."""
+    ready: TriState
+    """Whether the pre-arm checks pass. UNKNOWN: not reported."""
+    internal_errors_since: int | None
+    """Unix microseconds."""
+    rc_lost_with_state: bool
+    """Whether the RC receiver was lost when the vehicle entered its state."""
+
+
+class Cause(NamedTuple):
+    """A cause of an error, by its code."""
+
+    code: int
+    text: str | None
+    since_us: int
+
+
+class Latched(NamedTuple):
+    """The causes that were announced and are still active."""
+
+    causes: tuple[Cause, ...]
+    termination_outlived: bool
+    """Whether the vehicle is still armed some time after it announced a termination."""
+
+
+class SensorFault(NamedTuple):
+    """A bit of SYS_STATUS that has been faulty for long enough."""
+
+    bit: int
+    is_soft: bool
+    since_us: int
+
+
+class Explained(NamedTuple):
+    """The text that the autopilot sent."""
+
+    not_ready: str | None
+    """The reason why it cannot be armed."""
+    failsafe: str | None
+    """The text about a failsafe that its state reports."""
+
+
+class Facts(NamedTuple):
+    """Everything that a status depends on."""
+
+    kind: Kind
+    heartbeat: Heartbeat
+    state_since: int
+    """When it entered its MAV_STATE, Unix microseconds."""
+    fresh: Fresh
+    landed_state: int
+    movement: Movement
+    receiver_stands: bool
+    """Whether the GPS receiver reports that it stands still."""
+    outputs: Outputs
+    outputs_vetoed: bool
+    """Whether a motion shows that the vehicle is driven although the outputs seem held."""
+    esc_turning: bool
+    """Whether ESC telemetry shows a motor that turns."""
+    stop: Stop
+    stop_excused: bool
+    """Whether a switch exists whose stop the pre-arm checks ignore."""
+    assumed_free: bool
+    """Whether no stop was engaged when it was armed, and none was reported since."""
+    sys_status: SystemStatus
+    faults: tuple[SensorFault, ...]
+    latched: Latched
+    explained: Explained
+    mode_hints: ModeHints
+    text_overdue: bool
+    """Whether the missing chunks of a text are overdue."""
+
+    @property
+    def armed(self) -> bool:
+        """The only armed indication that exists."""
+        return bool(self.heartbeat.base_mode & MAV_MODE_FLAG_SAFETY_ARMED)

@@ -1,0 +1,52 @@
+"""A message changes the state. `HANDLERS` has one function for each type of message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
+
+from ....clock import Instant
+from ....mavlink import definitions as mav
+from ..state.vehicle_state import VehicleState
+from . import commands, heartbeat, kinematics, modes, outputs, statustext, sys_status
+from .commands import overheard
+from .statustext import pass_time
+
+if TYPE_CHECKING:
+    from ..options import HardwareOptions
+
+__all__ = ["HANDLERS", "hear", "overheard", "pass_time"]
+
+Handler = Callable[[VehicleState, Any, Instant, "HardwareOptions"], None]
+
+HANDLERS: Final[dict[type, Handler]] = {
+    mav.Heartbeat: heartbeat.heartbeat,
+    mav.SysStatus: sys_status.sys_status,
+    mav.Statustext: statustext.statustext_,
+    mav.Event: statustext.event,
+    mav.ExtendedSysState: kinematics.extended_sys_state,
+    mav.GlobalPositionInt: kinematics.global_position,
+    mav.LocalPositionNed: kinematics.local_position,
+    mav.VfrHud: kinematics.vfr_hud,
+    mav.GpsRawInt: kinematics.gps_raw_int,
+    mav.Attitude: kinematics.attitude,
+    mav.EkfStatusReport: kinematics.ekf_status_report,
+    mav.SystemTime: kinematics.system_time,
+    mav.ServoOutputRaw: outputs.servo_output_raw,
+    mav.ParamValue: outputs.param_value,
+    mav.EscTelemetry1To4: outputs.esc_telemetry,
+    mav.EscTelemetry5To8: outputs.esc_telemetry,
+    mav.EscTelemetry9To12: outputs.esc_telemetry,
+    mav.EscStatus: outputs.esc_status,
+    mav.CommandAck: commands.command_ack,
+    mav.CurrentMode: modes.current_mode,
+    mav.AvailableModes: modes.available_modes,
+    mav.AutopilotVersion: modes.autopilot_version,
+}
+
+
+def hear(state: VehicleState, message: Any, now: Instant, options: HardwareOptions) -> None:
+    """Update the state with one message of this vehicle. Messages without a handler change nothing."""
+    handler = HANDLERS.get(type(message))
+    if handler is not None:
+        handler(state, message, now, options)

@@ -1,0 +1,149 @@
+"""HEARTBEAT, and the state that a reboot, an arming and a long silence reset."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from ....interface.status import TriState
+from ....mavlink.definitions import Heartbeat
+from ....mavlink.enumerations import (
+    MAV_STATE_BOOT,
+    MAV_STATE_FLIGHT_TERMINATION,
+    MAV_STATE_STANDBY,
+    MAV_STATE_UNINIT,
+)
+from .. import causes
+from ..autopilots.profile import EmergencyStop, Uninit
+from ..state import boot_clock as boot_rules
+from ..state import estop, latches, outputs, sensors
+from ..state.heartbeat_history import armed_before, next_heartbeat
+from ..state.latest_messages import LatestMessages, heard
+from ..state.motion import Motion
+from ..state.vehicle_state import VehicleState, begin
+from .statustext import pass_time
+
+if TYPE_CHECKING:
+    from ....clock import Instant
+    from ..options import HardwareOptions
+
+LONG_LOSS: Final = 30.0
+"""Seconds of link loss after which all latched state is invalid."""
+TURN: Final = 10.0
+"""Seconds within which two autopilots with the same ids alternate."""
+
+
+def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: HardwareOptions) -> None:
+    """A HEARTBEAT: edges of armed and state, stop values, and whether the autopilot has rebooted."""
+    if (message.autopilot, message.type) != (state.autopilot, state.vehicle_type):
+        _another(state, message, now)
+        return
+    pass_time(state, now, options)
+    before = state.heartbeats
+    last = before.runs[-1].last
+    connected = now.mono - last <= options.heartbeat_timeout
+    heartbeats = state.heartbeats = next_heartbeat(before, message, now, connected)
+    enabled = not heartbeats.armed and _outputs_enabled(state)
+    outputs.heartbeat_arrived(state.watch, heartbeats, before, enabled, state.vehicle_type, now.mono)
+    seen = state.latest
+    previous: Heartbeat = seen.heartbeat.message if seen.heartbeat else message
+    seen.heartbeat = heard(seen, message, now.mono, seen.heartbeat)
+    if message != previous:
+        seen.unsettled = True
+        if _starts_anew(previous, message, state):
+            rebooted(state, boot_rules.BootClock(now.mono), now)
+    if now.mono - last > LONG_LOSS:
+        state.latches, state.stop = latches.NO_LATCHES, estop.NOTHING
+        state.not_ready = state.failsafe = None
+    if not connected:
+        state.motion, state.gps_motion = Motion(), Motion()
+    if not connected or (before.armed and not heartbeats.armed):
+        state.stop = state.stop._replace(ready=0)
+        state.assumed_free = False
+    if heartbeats.armed and not before.armed:
+        _armed(state, last, now)
+    if state.profile.stops.shown_by is EmergencyStop.STATE and message.system_status == MAV_STATE_FLIGHT_TERMINATION:
+        state.stop = estop.NOTHING  # it shows its stops, and need not be believed on its word
+    if heartbeats.calm_since == now.mono and state.failsafe is not None:
+        state.failsafe = None
+        seen.unsettled = True
+
+
+def _another(state: VehicleState, message: Heartbeat, now: Instant) -> None:
+    """Another autopilot: the state of the old one is invalid. Two that alternate claim the same ids."""
+    new = begin(message, now)
+    new.boots, new.formerly = state.boots, (state.autopilot, state.vehicle_type)
+    if state.formerly == (message.autopilot, message.type) and now.mono - state.heartbeats.since.mono <= TURN:
+        kept = {code: latch for code, latch in state.latches.items() if code == causes.SYSTEM_ID_CONFLICT}
+        new.latches = latches.announce(kept, causes.SYSTEM_ID_CONFLICT, None, now, "HEARTBEAT.type and autopilot")
+    state.become(new)
+
+
+def _starts_anew(previous: Heartbeat, message: Heartbeat, state: VehicleState) -> bool:
+    """The heartbeat reports that the autopilot is starting, and the one before reported that it was running."""
+    now_in, was_in = message.system_status, previous.system_status
+    if now_in == MAV_STATE_BOOT and was_in >= MAV_STATE_STANDBY:
+        return True
+    if now_in == MAV_STATE_UNINIT and was_in >= MAV_STATE_STANDBY and state.profile.states.uninit is Uninit.STARTING:
+        return True
+    starting = state.profile.modes.initialising.get(state.family)
+    return starting is not None and message.custom_mode == starting != previous.custom_mode
+
+
+def clock_changed(state: VehicleState, now: Instant) -> None:
+    """The clock gives another boot time: a small correction, which only matters for faults, or a reboot."""
+    if state.boot.rebooted:
+        rebooted(state, state.boot, now)
+    elif state.faults:
+        state.latest.unsettled = True
+
+
+def rebooted(state: VehicleState, boot: boot_rules.BootClock, now: Instant) -> None:
+    """After a reboot the state of the old run is invalid. A reboot while armed is an error."""
+    seen = state.latest
+    status = seen.sys_status if seen.sys_status is not None and seen.sys_status.at > boot.at else None
+    new = VehicleState(
+        latest=LatestMessages(heartbeat=seen.heartbeat, sys_status=status),
+        heartbeats=state.heartbeats,
+        boot=boot,
+        vehicle_type=state.vehicle_type,
+        autopilot=state.autopilot,
+        shown=state.shown,
+        watch=outputs.Watch(functions=state.watch.functions),
+        switches=state.switches,
+        modes=state.modes,
+        version=state.version,
+        asked=state.asked,
+        boots=state.boots + 1,
+        formerly=state.formerly,
+    )
+    if boot.in_turn:
+        new.latches = latches.announce(
+            new.latches, causes.SYSTEM_ID_CONFLICT, None, now, "time_boot_ms of two clocks in turn"
+        )
+    elif causes.REBOOT_WHILE_ARMED in state.latches or armed_before(state.heartbeats, boot.at, LONG_LOSS):
+        new.latches = latches.announce(new.latches, causes.REBOOT_WHILE_ARMED, None, now, "time_boot_ms")
+    state.become(new)
+
+
+def _armed(state: VehicleState, previous_beat: float, now: Instant) -> None:
+    """Arming ends earlier reports of stops and crashes, because the autopilot refuses to arm while they last.
+
+    Reports since the previous heartbeat stay: they may be later than the arming.
+    """
+    state.latches = {
+        code: latch
+        for code, latch in state.latches.items()
+        if causes.CAUSES[code].clears is not causes.Clears.ARMING or latch.last > previous_beat
+    }
+    stop = state.stop
+    checked = stop.ready >= estop.READY_MESSAGES and not estop.is_excused(state.switches)
+    free = checked or estop.still_said(stop, now.mono) is TriState.FALSE
+    new = stop.said is TriState.TRUE and stop.last > previous_beat and not stop.repeats
+    state.stop = stop._replace(ready=0) if new else estop.NOTHING
+    state.not_ready = None
+    state.assumed_free = free and not new
+
+
+def _outputs_enabled(state: VehicleState) -> bool:
+    status = state.latest.sys_status
+    return status is not None and not sensors.safety_switch_on(status.message)

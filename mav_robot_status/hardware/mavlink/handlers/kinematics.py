@@ -1,0 +1,195 @@
+"""Position, speed and attitude, and the clock in those messages."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from ....mavlink import definitions as mav
+from ....mavlink.enumerations import EKF_CONST_POS_MODE, GPS_FIX_TYPE_3D_FIX, MAV_TYPE_SURFACE_BOAT
+from ..autopilots.profile import HudSpeed, ZeroSpeed
+from ..identity import AIRCRAFT, ROVER
+from ..state import motion, sensors
+from ..state.boot_clock import heard_clock
+from ..state.latest_messages import FRESH, Heard, heard, is_fresh
+from .heartbeat import clock_changed
+
+if TYPE_CHECKING:
+    from ....clock import Instant
+    from ..options import HardwareOptions
+    from ..state.vehicle_state import VehicleState
+
+
+NO_SPEED: Final = 0xFFFF  # GPS_RAW_INT.vel
+ESTIMATOR_FRESH: Final = 10.0  # s
+# Module constants for code that runs many times a second: Python 3.11 is slow to look up a member of an enumeration.
+ALWAYS, ESTIMATOR_HEALTHY = ZeroSpeed.ALWAYS, ZeroSpeed.ESTIMATOR_HEALTHY
+MOTION_ONLY, REST_WITH_GPS = HudSpeed.MOTION_ONLY, HudSpeed.REST_WITH_GPS
+
+
+def extended_sys_state(state: VehicleState, message: Any, now: Instant, options: HardwareOptions) -> None:
+    """EXTENDED_SYS_STATE: the landed state."""
+    seen = state.latest
+    seen.extended_sys_state = heard(seen, message, now.mono, seen.extended_sys_state)
+
+
+def global_position(
+    state: VehicleState, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions
+) -> None:
+    """GLOBAL_POSITION_INT: the first choice for speed."""
+    at = now.mono
+    if heard_clock(state.boot, message.time_boot_ms, at):
+        clock_changed(state, now)
+    seen = state.latest
+    seen.global_position = heard(seen, message, at, seen.global_position)
+    vx, vy, vz = message.vx, message.vy, message.vz
+    still = not (vx or vy or vz)
+    nowhere = message.lat == 0 and message.lon == 0
+    speed = _speed(state, vx / 100, vy / 100, vz / 100, still, nowhere, at, options)
+    _moved(state, state.motion, speed, at, options)
+
+
+def local_position(state: VehicleState, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> None:
+    """LOCAL_POSITION_NED: the speed while no global position is fresh."""
+    at = now.mono
+    if heard_clock(state.boot, message.time_boot_ms, at):
+        clock_changed(state, now)
+    seen = state.latest
+    seen.local_position = heard(seen, message, at, seen.local_position)
+    if not is_fresh(seen.global_position, at, FRESH):
+        vx, vy, vz = message.vx, message.vy, message.vz
+        speed = _speed(state, vx, vy, vz, not (vx or vy or vz), False, at, options)
+        _moved(state, state.motion, speed, at, options)
+
+
+def vfr_hud(state: VehicleState, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> None:
+    """VFR_HUD: the last choice for speed; the throttle is for the output watch."""
+    at = now.mono
+    seen = state.latest
+    seen.vfr_hud = heard(seen, message, at, seen.vfr_hud)
+    if is_fresh(seen.global_position, at, FRESH) or is_fresh(seen.local_position, at, FRESH):
+        return
+    still = message.groundspeed == 0  # not the climb, which comes from the barometer
+    speed = _speed(state, message.groundspeed, 0.0, message.climb, still, False, at, options)
+    hud = state.profile.speeds.hud
+    if speed is None:
+        pass
+    elif hud is MOTION_ONLY:
+        speed = _if_fast(state, speed, options)
+    elif hud is REST_WITH_GPS and still and state.vehicle_type not in AIRCRAFT and _lacks_gps(state):
+        speed = None
+    _moved(state, state.motion, speed, at, options)
+
+
+def gps_raw_int(state: VehicleState, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> None:
+    """GPS_RAW_INT: whether the receiver reports that it stands still."""
+    if message.fix_type < GPS_FIX_TYPE_3D_FIX or message.vel == NO_SPEED:
+        state.gps_motion = motion.Motion()
+        return
+    at = now.mono
+    seen = state.latest
+    seen.gps = heard(seen, message, at, seen.gps)
+    _moved(state, state.gps_motion, message.vel / 100, at, options)
+
+
+def attitude(state: VehicleState, message: mav.Attitude, now: Instant, options: HardwareOptions) -> None:
+    """ATTITUDE: rotation."""
+    at = now.mono
+    if heard_clock(state.boot, message.time_boot_ms, at):
+        clock_changed(state, now)
+    seen = state.latest
+    seen.attitude = heard(seen, message, at, seen.attitude)
+    if state.vehicle_type == MAV_TYPE_SURFACE_BOAT:  # they always roll
+        state.turning = fastest(message.yawspeed)
+    else:
+        state.turning = fastest(message.yawspeed, message.rollspeed, message.pitchspeed)
+
+
+def ekf_status_report(
+    state: VehicleState, message: mav.EkfStatusReport, now: Instant, options: HardwareOptions
+) -> None:
+    """EKF_STATUS_REPORT: whether the position is measured, or the estimator assumes that the vehicle stands still."""
+    state.unaided, state.unaided_at = bool(message.flags & EKF_CONST_POS_MODE), now.mono
+
+
+def system_time(state: VehicleState, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
+    """SYSTEM_TIME: the autopilot's clock."""
+    if heard_clock(state.boot, message.time_boot_ms, now.mono):
+        clock_changed(state, now)
+
+
+def _speed(
+    state: VehicleState, x: float, y: float, z: float, still: bool, nowhere: bool, now: float, options: HardwareOptions
+) -> float | None:
+    """Speed in m/s, None where the numbers mean that there is no estimate: `still` exactly zero, `nowhere` at 0, 0."""
+    if not math.isfinite(x + y + z):
+        return None
+    speed = math.hypot(x, y) if state.family is ROVER else math.hypot(x, y, z)
+    status = state.latest.sys_status
+    speeds = state.profile.speeds
+    if still and speeds.zero is not ALWAYS and not _counts_as_rest(speeds.zero, status, nowhere):
+        return None
+    if (
+        speeds.needs_healthy_estimator
+        and not state.heartbeats.armed
+        and status is not None
+        and sensors.estimate_is_faulty(status.message)
+    ):
+        return None
+    return _measured(state, speed, z, nowhere, now, options) if speeds.reports_estimator else speed
+
+
+def _counts_as_rest(zero: ZeroSpeed, status: Heard | None, nowhere: bool) -> bool:
+    """Whether a speed of exactly zero is an estimate."""
+    if zero is ESTIMATOR_HEALTHY:
+        return not nowhere and status is not None and sensors.estimate_is_healthy(status.message)
+    return _has_gps(status)
+
+
+def _measured(
+    state: VehicleState, speed: float, climb: float, nowhere: bool, now: float, options: HardwareOptions
+) -> float | None:
+    """The measured part of `speed`: without a position the estimator reports nearly zero at any speed.
+
+    Then only the climb, from air or water pressure, is measured. It can prove motion, but not rest.
+    """
+    if now - state.unaided_at > ESTIMATOR_FRESH:
+        return _if_fast(state, speed, options) if nowhere else speed
+    if not state.unaided:
+        return speed
+    return None if state.family is ROVER else _if_fast(state, abs(climb), options)
+
+
+def _if_fast(state: VehicleState, speed: float, options: HardwareOptions) -> float | None:
+    """`speed` if it shows motion; None if it would show rest."""
+    return speed if speed > (options.v_on if state.heartbeats.armed else options.v_on_disarmed) else None
+
+
+def _lacks_gps(state: VehicleState) -> bool:
+    status = state.latest.sys_status
+    return status is not None and not _has_gps(status)
+
+
+def _has_gps(status: Heard | None) -> bool:
+    return status is not None and bool(
+        status.message.onboard_control_sensors_present & status.message.onboard_control_sensors_health & sensors.GPS
+    )
+
+
+def fastest(*rates: float) -> float:
+    """The greatest magnitude of some rates. NaN is ignored."""
+    found = 0.0
+    for rate in rates:
+        if found < rate < math.inf:
+            found = rate
+        elif found < -rate < math.inf:
+            found = -rate
+    return found
+
+
+def _moved(
+    state: VehicleState, moving: motion.Motion, speed: float | None, now: float, options: HardwareOptions
+) -> None:
+    """One more sample of speed."""
+    rotation = state.turning if is_fresh(state.latest.attitude, now, FRESH) else 0.0
+    motion.moved(moving, speed, rotation, state.heartbeats.armed, options, now)

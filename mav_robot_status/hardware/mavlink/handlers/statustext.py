@@ -1,0 +1,103 @@
+"""STATUSTEXT and EVENT: what they report, and when a report without repetition ends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from ....mavlink.definitions import Event, Statustext
+from ....mavlink.enumerations import MAV_STATE_CRITICAL, MAV_STATE_FLIGHT_TERMINATION
+from .. import causes
+from ..autopilots import texts as text_rules
+from ..autopilots.profile import StopText
+from ..autopilots.texts import UNCLASSIFIED, Effect, When, classify
+from ..state import estop, latches, text_assembly
+from ..state.vehicle_state import Statement
+
+if TYPE_CHECKING:
+    from ....clock import Instant
+    from ..options import HardwareOptions
+    from ..state.vehicle_state import VehicleState
+
+MOST_INTERNAL: Final = 5
+"""The highest internal level of an EVENT that is used: 6 is a response to an operator's command."""
+
+
+def pass_time(state: VehicleState, now: Instant, options: HardwareOptions) -> None:
+    """End what has timed out at `now`: texts with missing chunks, and latches."""
+    if state.texts:
+        state.texts, overdue = text_assembly.overdue(state.texts, now.mono)
+        for text in overdue:
+            _said(state, text, now)
+    if state.latches:
+        state.latches = latches.lasting(state.latches, state.heartbeats, now.mono, options.text_hold_s)
+
+
+def statustext_(state: VehicleState, message: Statustext, now: Instant, options: HardwareOptions) -> None:
+    """A STATUSTEXT, or a chunk of one."""
+    pass_time(state, now, options)
+    state.texts, finished = text_assembly.heard_chunk(state.texts, message, now)
+    for text in finished:
+        _said(state, text, now)
+
+
+def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
+    """A complete text, or the part that arrived."""
+    words = text.text
+    rule = classify(words, state.profile.texts.rules)
+    if rule is None:
+        if text.severity <= UNCLASSIFIED and state.heartbeats.armed and classify(words, text_rules.COMMON) is None:
+            state.latches = latches.announce(state.latches, causes.TEXT + text.severity, words, now)
+        return
+    effect = rule.effect
+    if effect is Effect.CAUSE and not _counts(rule.when, state):
+        effect = Effect.DETAIL if state.heartbeats.armed else Effect.READINESS
+    if effect is Effect.CAUSE:
+        for code in rule.codes:
+            state.latches = latches.announce(state.latches, code, words, now)
+    elif effect is Effect.CLEAR:
+        state.latches = latches.clear(state.latches, rule.codes)
+    elif effect in (Effect.ESTOP, Effect.RELEASE):
+        honoured_by = state.profile.stops.honoured_by
+        if honoured_by is not None and state.heartbeats.armed and state.family not in honoured_by:
+            return
+        engaged = effect is Effect.ESTOP
+        state.stop = estop.said(state.stop, engaged, words, now)
+        state.assumed_free = False
+        if state.profile.texts.stop_text is StopText.STATE:
+            state.failsafe = _say(state.failsafe, words, now)
+        elif engaged:
+            state.not_ready = _say(state.not_ready, words, now)
+    elif effect is Effect.READINESS:
+        state.not_ready = _say(state.not_ready, words, now)
+    elif effect is Effect.DETAIL:
+        state.failsafe = _say(state.failsafe, words, now)
+
+
+def _counts(when: When, state: VehicleState) -> bool:
+    mav_state = state.heartbeats.state
+    if when is When.ARMED:
+        return state.heartbeats.armed
+    if when is When.CRITICAL:
+        return mav_state == MAV_STATE_CRITICAL
+    if when is When.IN_TROUBLE:
+        return state.heartbeats.armed or mav_state in (MAV_STATE_CRITICAL, MAV_STATE_FLIGHT_TERMINATION)
+    return True
+
+
+def _say(before: Statement | None, words: str, now: Instant) -> Statement:
+    return Statement(words, before.since if before is not None and before.text == words else now, now.mono)
+
+
+def event(state: VehicleState, message: Event, now: Instant, options: HardwareOptions) -> None:
+    """EVENT (PX4): without metadata only the levels of an event are known."""
+    if message.sequence == state.event:
+        return
+    state.event = message.sequence
+    external, internal = message.log_levels & 0x0F, message.log_levels >> 4
+    if (
+        state.profile.texts.sends_events
+        and state.heartbeats.armed
+        and external <= UNCLASSIFIED
+        and internal <= MOST_INTERNAL
+    ):
+        state.latches = latches.announce(state.latches, causes.EVENT + external, None, now, "EVENT")

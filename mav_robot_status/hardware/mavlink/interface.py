@@ -1,0 +1,336 @@
+"""`MavlinkRobotHW`: the hardware interface. It processes frames, keeps the state of each vehicle, and sets the handles.
+
+The cycle of ros_control: `take` each frame, `read(time)` into the handles, then send the `due_requests(time)`.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import TYPE_CHECKING, Final
+
+from ...interface import DEFAULT_HANDLE_NAME, Detail, LinkState, RobotHW, RobotStatus
+from ...mavlink import definitions as mav
+from .causes import SYSTEM_ID_CONFLICT
+from .derive import derive
+from .evidence import EvidenceOfVehicle
+from .handlers import overheard, pass_time
+from .identity import is_autopilot, named
+from .message_table import COMMAND_IDS, HEARTBEAT_ID, KINDS
+from .moment import Moment
+from .options import HardwareOptions
+from .requests.scheduler import Ask, RequestScheduler
+from .rules.inhibits import inhibit
+from .settle import facts_of
+from .state import latches, motion
+from .state.latest_messages import SILENCE
+from .state.vehicle_state import begin
+from .vehicle import ExpectedVehicle, TrackedVehicle
+
+if TYPE_CHECKING:
+    from collections.abc import Container, Iterator, Sequence
+
+    from ...clock import Instant
+    from ...mavlink.framing import Values
+    from .facts import Facts
+    from .state.vehicle_state import VehicleState
+
+log = logging.getLogger(__name__)
+
+MOST_VEHICLES: Final = 256
+
+
+class MavlinkRobotHW(RobotHW):
+    """The vehicles heard on MAVLink links, as handles."""
+
+    def __init__(
+        self, options: HardwareOptions | None = None, slots: Sequence[ExpectedVehicle] = (), own_component: int = 192
+    ) -> None:
+        super().__init__()
+        self.options = options or HardwareOptions()
+        self._asking = RequestScheduler(self.options.watch_outputs, own_component)
+        # exact ids match before open ones
+        ordered = sorted(slots, key=lambda slot: (slot.system is None, slot.component is None))
+        self._expected = [TrackedVehicle(slot) for slot in ordered]
+        self._short_timeouts = min(self.options.heartbeat_timeout, self.options.sys_status_timeout) < SILENCE
+        """Whether a message can become too old within SILENCE. Then every message can make its kind fresh again."""
+        self._open = not slots
+        """Whether every autopilot that sends a HEARTBEAT gets a handle."""
+        self._tracked: dict[tuple[int, int], TrackedVehicle] = {}
+        self.dirty_vehicles: list[TrackedVehicle] = []
+        """The vehicles whose facts may have changed since the last `read`."""
+        self.deadline = math.inf
+        """The first deadline of all vehicles, monotonic seconds. -inf while a vehicle is in `dirty_vehicles`."""
+        self.asks = False
+        """Whether `due_requests` is called at all."""
+        self._unheard = True
+        """Whether the handles of vehicles that sent nothing still lack their inhibit LINK_STALE."""
+        self.ignored = 0
+        """Heartbeats of autopilots that no entry of the configuration names, or beyond MOST_VEHICLES."""
+        for slot in slots:
+            self.handles.register_handle(next(t.handle for t in self._expected if t.slot is slot))
+
+    @property
+    def vehicles(self) -> Iterator[TrackedVehicle]:
+        """The vehicles heard so far."""
+        return iter(self._tracked.values())
+
+    def find(self, system: int, component: int) -> TrackedVehicle | None:
+        """The vehicle with these ids, if it was heard."""
+        return self._tracked.get((system, component))
+
+    def speak_as(self, system: int | None, component: int) -> None:
+        """Our ids, to which acknowledgements are addressed. `system` None: the system id of the vehicle."""
+        self._asking.own_system, self._asking.own_component = system, component
+
+    def take(self, frame: Values, now: Instant) -> TrackedVehicle | None:
+        """Process one frame. Returns the vehicle if the frame is a heartbeat of its autopilot, else None."""
+        message_id, ids, _, message, _, _ = frame
+        try:
+            handler, settles = KINDS[message_id]
+        except KeyError:
+            if message_id in COMMAND_IDS:
+                self._overhear(message, ids, now)
+            return None
+        tracked = self._tracked.get(ids)
+        sender = None
+        if message_id == HEARTBEAT_ID:
+            tracked = sender = self._vehicle_of(tracked, message, ids, now)
+        if tracked is None:
+            return None
+        state = tracked.state
+        if state is None:
+            if sender is not None:
+                tracked.state = begin(message, now)
+                self._mark_dirty(tracked)
+            return sender
+        if tracked.requests is not None and sender is None:
+            self._asking.heard(tracked, message, message_id, now.mono)
+        options = self.options
+        handler(state, message, now, options)
+        if state.latest.unsettled:
+            if not tracked.dirty:
+                self._mark_dirty(tracked)
+            return sender
+        facts, moment = tracked.facts, tracked.moment
+        moment.now = now.mono
+        for place, settle in settles:
+            if settle(state, moment, options) != facts[place]:
+                self._mark_dirty(tracked)
+                return sender
+        if moment.next < self.deadline:
+            self.deadline = moment.next
+        return sender
+
+    def read(self, now: Instant) -> None:
+        """Update the handles to `now`."""
+        if self._unheard:
+            self._report_unheard(now)
+        if now.mono >= self.deadline:
+            self._look_again(now.mono)
+            for tracked in self._tracked.values():
+                if now.mono >= tracked.moment.next and not tracked.dirty:
+                    self._mark_dirty(tracked)
+        if self.dirty_vehicles:
+            for tracked in self.dirty_vehicles:
+                self._evaluate(tracked, now)
+            self.dirty_vehicles.clear()
+            self._find_deadline()
+
+    def explain(self, handle: str, now: Instant) -> None:
+        """Update the evidence in a handle to `now`; `read` updates it only when a status may have changed."""
+        for tracked in self._tracked.values():
+            if tracked.handle.name == handle:
+                self._evaluate(tracked, now)
+
+    def due_requests(self, now: Instant, passive: Container[tuple[int, int]] = ()) -> list[Ask]:
+        """The requests to send at `now`, none to vehicles on `passive` links."""
+        return self._asking.due(self._tracked, now.mono, passive)
+
+    def conflict(self, ids: tuple[int, int], now: Instant) -> None:
+        """Report that two autopilots use the ids of this vehicle, on different paths."""
+        tracked = self._tracked.get(ids)
+        if tracked is not None and tracked.state is not None:
+            state = tracked.state
+            state.latches = latches.announce(state.latches, SYSTEM_ID_CONFLICT, None, now, "clocks of two autopilots")
+            self._mark_dirty(tracked)
+
+    def next_due(self, until: float = -math.inf) -> float:
+        """When (monotonic seconds) `read` or `due_requests` has work. -inf: now, because of a frame.
+
+        A time before `until` is exact. A later time is a lower bound: newer messages may postpone it.
+        """
+        if self.deadline < until and not self.dirty_vehicles:
+            self._look_again(until)
+        if self.asks:
+            due = self._asking.next_due
+            if due < self.deadline:
+                return due
+        return self.deadline
+
+    def adopt(self, other: MavlinkRobotHW) -> None:
+        """Adopt the vehicles of another interface, with the options and slots of this one. Do not use `other` again.
+
+        Statuses do not change until the next `read`.
+        """
+        for ids, theirs in other._tracked.items():
+            name = theirs.handle.name if other._open else None
+            tracked = None if theirs.state is None else self._place(ids, name)
+            if tracked is None:
+                continue
+            ours = tracked.handle
+            ours.status, ours.detail, ours.heard_at = theirs.handle.status, theirs.handle.detail, theirs.handle.heard_at
+            tracked.state, tracked.boots, tracked.losses = theirs.state, theirs.boots, theirs.losses
+            tracked.requests, tracked.parameters = theirs.requests, theirs.parameters
+            self._mark_dirty(tracked)
+
+    def forget(self, keep: Container[tuple[int, int]] = ()) -> None:
+        """Drop all vehicle states, as at the start of a log segment. Handles keep their vehicles.
+
+        Vehicles with the ids `keep` keep their state.
+        """
+        for tracked in self._tracked.values():
+            if tracked.ids in keep:
+                continue
+            tracked.state, tracked.facts = None, ()
+            tracked.boots = 0
+            tracked.dirty, tracked.moment = False, Moment(-math.inf)
+            system, component = tracked.ids or (None, None)
+            tracked.handle.status = RobotStatus()
+            tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)
+            tracked.handle.heard_at = None
+            tracked.handle.evidence = {}
+        self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked.dirty]
+        self._find_deadline()
+        self._unheard = True
+
+    def _report_unheard(self, now: Instant) -> None:
+        """Once: set LINK_STALE for each expected vehicle that sent nothing."""
+        self._unheard = False
+        for tracked in self._expected:
+            if tracked.state is None:
+                unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
+                tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
+                self.changed = True
+
+    def _overhear(self, message: mav.CommandInt | mav.CommandLong, sender: tuple[int, int], now: Instant) -> None:
+        """Note a command that a ground station sends to one of the vehicles."""
+        for (system, component), tracked in self._tracked.items():
+            addressed = message.target_system == system and message.target_component in (0, component)
+            if addressed and tracked.state is not None:
+                overheard(tracked.state, message, sender, now)
+
+    def _vehicle_of(
+        self, tracked: TrackedVehicle | None, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant
+    ) -> TrackedVehicle | None:
+        """The vehicle whose autopilot sent this heartbeat; None if it is not from an autopilot."""
+        if tracked is None:
+            tracked = self._discover(heartbeat, ids, now)
+        elif not is_autopilot(heartbeat, ids[1]):
+            return None
+        if tracked is not None:
+            tracked.handle.heard_at = now.mono
+        return tracked
+
+    def _discover(self, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant) -> TrackedVehicle | None:
+        """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
+        if not is_autopilot(heartbeat, ids[1]):
+            return None
+        tracked = self._place(ids)
+        if tracked is None:
+            self.ignored += 1
+            return None
+        names = named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), named(mav.TYPE_NAMES, heartbeat.type)
+        log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
+        return tracked
+
+    def _place(self, ids: tuple[int, int], name: str | None = None) -> TrackedVehicle | None:
+        """A new vehicle with these ids; None if no entry matches. `name` is the name of its handle if that is new."""
+        tracked = next((t for t in self._expected if t.matches(*ids)), None)
+        if tracked is None and self._open and len(self._tracked) < MOST_VEHICLES:
+            if name is None:
+                name = DEFAULT_HANDLE_NAME if not self._tracked else f"{DEFAULT_HANDLE_NAME}/{ids[0]}.{ids[1]}"
+            tracked = TrackedVehicle(ExpectedVehicle(*ids, name))
+            self.handles.register_handle(tracked.handle)
+        if tracked is not None:
+            tracked.ids = ids
+            self._tracked[ids] = tracked
+        return tracked
+
+    def _mark_dirty(self, tracked: TrackedVehicle) -> None:
+        """Make a `read` due at once, to evaluate this vehicle. Until then its messages settle no facts."""
+        tracked.dirty = True
+        if tracked.state is not None:
+            tracked.state.latest.unsettled = True
+        self.dirty_vehicles.append(tracked)
+        self.deadline = -math.inf
+
+    def _look_again(self, until: float) -> None:
+        """Postpone each deadline up to `until` at which the facts do not change, because messages kept arriving."""
+        for tracked in self._tracked.values():
+            while tracked.moment.next <= until and tracked.state is not None and not tracked.dirty:
+                moment = Moment(tracked.moment.next)
+                if facts_of(tracked.state, moment, self.options) != tracked.facts:
+                    break
+                tracked.moment = moment
+        self._find_deadline()
+
+    def _find_deadline(self) -> None:
+        """Set `deadline`."""
+        first = min((tracked.moment.next for tracked in self._tracked.values()), default=math.inf)
+        self.deadline = -math.inf if self.dirty_vehicles else first
+
+    def _evaluate(self, tracked: TrackedVehicle, now: Instant) -> None:
+        """Update the handle of a vehicle to `now`. Derive a new status only if its facts have changed."""
+        state = tracked.state
+        if state is None:
+            return
+        if state.boots != tracked.boots:
+            self._report_reboot(tracked, state, now)
+        pass_time(state, now, self.options)
+        motion.settle(state.motion, now.mono)
+        motion.settle(state.gps_motion, now.mono)
+        tracked.moment = moment = Moment(now.mono)
+        facts = facts_of(state, moment, self.options)
+        state.latest.unsettled = self._short_timeouts
+        if facts != tracked.facts:
+            tracked.facts = facts
+            self._renew(tracked, state, facts, now)
+        tracked.dirty = False
+        if not facts.fresh.heartbeat:
+            moment.next = math.inf
+
+    def _renew(self, tracked: TrackedVehicle, state: VehicleState, facts: Facts, now: Instant) -> None:
+        """Derive the status in the handle from the facts."""
+        assert tracked.ids is not None
+        handle = tracked.handle
+        derived = derive(facts, tracked.ids, handle.detail, now, self.options)
+        self._log_link(tracked, derived.detail.link)
+        if derived.status != handle.status:
+            handle.status = derived.status
+            self.changed = True
+        if derived.detail != handle.detail:
+            handle.detail = derived.detail
+            self.changed = True
+        handle.evidence = EvidenceOfVehicle(state, facts, derived.reasons)
+
+    def _report_reboot(self, tracked: TrackedVehicle, state: VehicleState, now: Instant) -> None:
+        tracked.boots = state.boots
+        log.info("vehicle %d.%d has rebooted", *(tracked.ids or (0, 0)))
+        if tracked.requests is not None:
+            tracked.requests.restart(now.mono)
+            self._asking.next_due = -math.inf
+
+    def _log_link(self, tracked: TrackedVehicle, state: LinkState) -> None:
+        before = tracked.handle.detail.link
+        if state is before:
+            return
+        self._asking.next_due = -math.inf
+        ids = tracked.ids or (0, 0)
+        if state is LinkState.LOST and before is LinkState.CONNECTED:
+            tracked.losses += 1
+            log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, self.options.heartbeat_timeout)
+        elif state is LinkState.CONNECTED and before is LinkState.LOST:
+            log.info("vehicle %d.%d is back", *ids)
+            if tracked.requests is not None:
+                tracked.requests.resume(tracked.handle.heard_at or 0.0)

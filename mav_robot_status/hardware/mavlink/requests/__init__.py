@@ -1,0 +1,1 @@
+"""Requests to an autopilot: for missing messages and for parameters."""

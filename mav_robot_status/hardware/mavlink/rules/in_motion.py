@@ -1,0 +1,66 @@
+"""in_motion: airborne, or moving or turning by measurement."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from ....mavlink.enumerations import (
+    MAV_LANDED_STATE_IN_AIR,
+    MAV_LANDED_STATE_LANDING,
+    MAV_LANDED_STATE_ON_GROUND,
+    MAV_LANDED_STATE_TAKEOFF,
+    MAV_LANDED_STATE_UNDEFINED,
+    MAV_STATE_STANDBY,
+)
+from ..identity import AIRCRAFT
+from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
+
+if TYPE_CHECKING:
+    from ..facts import Facts
+    from ..options import HardwareOptions
+
+IN_THE_AIR: Final = frozenset({MAV_LANDED_STATE_IN_AIR, MAV_LANDED_STATE_TAKEOFF, MAV_LANDED_STATE_LANDING})
+
+
+def in_motion(facts: Facts, options: HardwareOptions) -> Finding:
+    """Airborne, or moving or turning by measurement."""
+    aircraft = facts.kind.vehicle_type in AIRCRAFT
+    landed = facts.landed_state if facts.fresh.landed_state else MAV_LANDED_STATE_UNDEFINED
+    on_ground = aircraft and landed == MAV_LANDED_STATE_ON_GROUND
+    if facts.armed and aircraft and landed in IN_THE_AIR and options.hover_is_motion:
+        return TRUE, Reason("airborne", Source.LANDED_NUMBER)
+    value, why = _measured(facts, on_ground)
+    if why.source is Source.NONE:
+        return value, why
+    if value is UNKNOWN and facts.movement.is_slow:
+        # not slow for long enough, but the land detector agrees, or the receiver has stood still for long enough
+        value = FALSE if (on_ground and not facts.armed) or _receiver_stands(facts) else UNKNOWN
+    if value is FALSE and facts.armed and aircraft and landed == MAV_LANDED_STATE_UNDEFINED and not _is_landed(facts):
+        source = Source.VELOCITY if why.source is Source.VELOCITY else Source.NONE
+        return UNKNOWN, Reason("armed, and nothing tells whether it is airborne", source)
+    return value, why
+
+
+def _measured(facts: Facts, on_ground: bool) -> Finding:
+    """The estimate, else the land detector, else the GPS receiver, which can only show rest."""
+    if facts.fresh.velocity is not None and facts.movement.is_measured:
+        if facts.movement.moves_disarmed and facts.fresh.global_position and _receiver_stands(facts):
+            # seen after a crash: the estimate ran away at 36 m/s while the vehicle lay on its back
+            rule = "disarmed: the estimate moves, the GPS receiver stands still"
+            return UNKNOWN, Reason(rule, Source.VELOCITY)
+        return facts.movement.value, Reason("speed and rotation, with hysteresis", Source.VELOCITY)
+    if on_ground:
+        return FALSE, Reason("on the ground, no speed known", Source.LANDED_STATE)
+    if _receiver_stands(facts):
+        return FALSE, Reason("no estimate, but the GPS receiver stands still", Source.GPS)
+    return UNKNOWN, Reason("no fresh speed")
+
+
+def _receiver_stands(facts: Facts) -> bool:
+    """Whether the speed of the GPS receiver shows rest, without rotation. At rest it may read several m/s."""
+    return facts.fresh.gps and facts.receiver_stands
+
+
+def _is_landed(facts: Facts) -> bool:
+    """Whether the autopilot's land detector reports landed."""
+    return facts.kind.profile.states.standby_is_landed and facts.heartbeat.system_status == MAV_STATE_STANDBY

@@ -1,0 +1,1 @@
+"""The state of one vehicle: values and records that messages change."""

@@ -1,0 +1,58 @@
+"""When the autopilot booted, from its own clock, and whether it has rebooted.
+
+Sources: MAVLink developer guide, routing: `SYSTEM_TIME.time_boot_ms` going back means a reboot. Any message with
+time_boot_ms can be used. A step back counts when the next sample confirms it: repeated packets do not confirm it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+STEP_BACK_MS: Final = 2000
+STEP_BACK: Final = STEP_BACK_MS / 1000  # seconds
+WRAP: Final = 1 << 32  # of a clock of 32 bits, after 49 days
+HALF: Final = WRAP // 2
+GRACE: Final = 10.0
+"""Seconds after boot during which sensor bits raise no error."""
+
+
+@dataclass(slots=True)
+class BootClock:
+    """The latest sample of the autopilot's clock: a record that each sample changes in place."""
+
+    at: float
+    """Monotonic seconds of the boot; of the first heartbeat while there is no sample."""
+    clock_ms: int | None = None
+    doubt_ms: int | None = None
+    """An earlier time that the next sample must confirm."""
+    shown: float | None = None
+    """The boot time after the last step back, monotonic seconds."""
+    rebooted: bool = False
+    """Whether the latest change is a reboot."""
+    in_turn: bool = False
+    """Whether the clock returned to an earlier boot time after another one: two autopilots alternate."""
+
+
+def heard_clock(boot: BootClock, time_boot_ms: int, now: float) -> bool:
+    """Process one sample. True if it changes the boot time: by a correction or a reboot (`rebooted`)."""
+    booted = now - time_boot_ms / 1000
+    clock_ms = boot.clock_ms
+    if clock_ms is None or clock_ms < time_boot_ms < clock_ms + HALF or time_boot_ms < clock_ms - HALF:  # it wraps
+        # transport only delays samples, so the earliest boot time is the most accurate
+        boot.clock_ms = time_boot_ms
+        boot.doubt_ms = None
+        if clock_ms is not None and 0 <= booted - boot.at < STEP_BACK:
+            return False
+        boot.at, boot.rebooted = booted, False
+        return True
+    if (clock_ms - time_boot_ms) % WRAP <= STEP_BACK_MS:
+        boot.doubt_ms = None
+        return False
+    if boot.doubt_ms is None or (time_boot_ms - boot.doubt_ms + HALF) % WRAP < HALF:
+        boot.doubt_ms = time_boot_ms
+        return False
+    boot.in_turn = boot.shown is not None and abs(booted - boot.shown) < STEP_BACK_MS / 1000
+    boot.at, boot.clock_ms, boot.doubt_ms, boot.shown = booted, time_boot_ms, None, booted
+    boot.rebooted = True
+    return True

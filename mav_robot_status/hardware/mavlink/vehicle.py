@@ -1,0 +1,63 @@
+"""One vehicle of the hardware interface: its slot, its handle, and its state after the first HEARTBEAT."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from ...interface import DEFAULT_HANDLE_NAME, Detail, IndustrialRobotStatusHandle, LinkState
+from .moment import Moment
+
+if TYPE_CHECKING:
+    from .facts import Facts
+    from .requests.message_intervals import Requests
+    from .requests.parameters import Parameters
+    from .state.vehicle_state import VehicleState
+
+
+class ExpectedVehicle(NamedTuple):
+    """An expected vehicle and the name of its handle. None: any id."""
+
+    system: int | None = None
+    component: int | None = None
+    handle: str = DEFAULT_HANDLE_NAME
+
+
+class TrackedVehicle:
+    """One vehicle: its handle, and after the first HEARTBEAT its ids and state."""
+
+    __slots__ = (
+        "boots",
+        "dirty",
+        "facts",
+        "handle",
+        "ids",
+        "losses",
+        "moment",
+        "parameters",
+        "requests",
+        "slot",
+        "state",
+    )
+
+    def __init__(self, slot: ExpectedVehicle) -> None:
+        self.slot = slot
+        self.handle = IndustrialRobotStatusHandle(slot.handle)
+        self.handle.detail = Detail(slot.system, slot.component, link=LinkState.NEVER_SEEN)
+        self.ids: tuple[int, int] | None = None
+        self.state: VehicleState | None = None
+        self.requests: Requests | None = None
+        self.parameters: Parameters | None = None
+        self.boots = 0
+        self.losses = 0
+        """How often the link was lost."""
+        self.facts: Facts | tuple[()] = ()
+        """The facts that the status in the handle is derived from."""
+        self.dirty = False
+        """Whether the next `read` evaluates it."""
+        self.moment = Moment(-math.inf)
+        """The time of the last evaluation. Its `next` is the deadline: until then only a message changes the facts."""
+
+    def matches(self, system: int, component: int) -> bool:
+        """Whether this slot is free for an autopilot with these ids."""
+        return self.ids is None and self.slot.system in (None, system) and self.slot.component in (None, component)

@@ -1,0 +1,45 @@
+"""A handle with the evidence for each field, as plain values, for `explain --as-json` and the web page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..clock import rfc3339
+from .fields import STATES
+
+if TYPE_CHECKING:
+    from ..clock import Instant
+    from .fields import Field
+    from .handle import IndustrialRobotStatusHandle
+
+
+def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> dict[str, Any]:
+    """The status in a handle with its evidence. Ages are in seconds at `now`; UNKNOWN is None."""
+    detail = handle.detail
+    return {
+        "stamp": rfc3339(now.unix_us),
+        "handle": handle.name,
+        "system": detail.system,
+        "component": detail.component,
+        "vehicle": detail.vehicle._asdict(),
+        "link": {
+            "state": detail.link.value,
+            "heartbeat_age": None if handle.heard_at is None else round(now.mono - handle.heard_at, 3),
+        },
+        "fields": {field.name: _field(handle, field, now.mono) for field in STATES},
+        "error_code": handle.status.error_code,
+        "errors": [
+            {"code": e.code, "name": e.name, "text": e.text, "since": rfc3339(e.since_us)} for e in detail.errors
+        ],
+        "inhibits": [{"name": i.name, "text": i.text, "since": rfc3339(i.since_us)} for i in detail.inhibits],
+    }
+
+
+def _field(handle: IndustrialRobotStatusHandle, field: Field, now: float) -> dict[str, Any]:
+    evidence = handle.evidence.get(field.name)
+    return {
+        "value": field.plain(getattr(handle.status, field.name)),
+        "rule": evidence.rule if evidence else None,
+        "source": evidence.source if evidence else None,
+        "age": None if evidence is None or evidence.at is None else round(now - evidence.at, 3),
+    }

@@ -1,0 +1,124 @@
+"""`validate`: the invariants of the status and detail of every robot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from .fields import FIELDS, STATES, Kind, RobotMode, RobotStatus, TriState
+from .status import Detail, ErrorCause, Inhibit, LinkState, Vehicle
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+CODES: Final = range(-(2**31), 2**31)
+"""ROBOT_STATUS and industrial_msgs carry a code as int32."""
+IDS: Final = range(256)
+
+TRUE, FALSE = TriState.TRUE, TriState.FALSE
+
+
+def validate(status: RobotStatus, detail: Detail | None = None) -> str | None:
+    """The first invariant that a status and its detail violate, as a sentence; None if they are valid.
+
+    A value of the wrong type is reported with the name of its field. Without a detail, the status alone is checked.
+    """
+    found = _wrong_type(status) or _broken(status)
+    if found is not None or detail is None:
+        return found
+    return _wrong_detail(detail) or _contradiction(status, detail)
+
+
+def _wrong_type(status: object) -> str | None:
+    if not isinstance(status, RobotStatus):
+        return f"the status must be a RobotStatus, not {status!r}"
+    for field in FIELDS:
+        value = getattr(status, field.name)
+        if field.kind is Kind.CODE:
+            if not _is_number(value):
+                return f"{field.name}: must be a whole number of 32 bits, not {value!r}"
+        elif not isinstance(value, _ENUMS[field.kind]):
+            return f"{field.name}: must be a {_ENUMS[field.kind].__name__}, not {value!r}"
+    return None
+
+
+_ENUMS: Final = {Kind.MODE: RobotMode, Kind.TRI_STATE: TriState}
+
+
+def _broken(status: RobotStatus) -> str | None:
+    if status.e_stopped is TRUE and status.drives_powered is not FALSE:
+        return "I1: e_stopped is TRUE, so drives_powered must be FALSE"
+    if status.drives_powered is FALSE and status.motion_possible is not FALSE:
+        return "I2: drives_powered is FALSE, so motion_possible must be FALSE"
+    if (status.error_code != 0) != (status.in_error is TRUE):
+        return "I3: error_code must be non-zero if in_error is TRUE, and 0 otherwise"
+    return None
+
+
+def _contradiction(status: RobotStatus, detail: Detail) -> str | None:
+    if detail.link is not LinkState.CONNECTED and not _knows_nothing(status):
+        return f"I4: the link is {detail.link.name}, so every field must be UNKNOWN (in_error may be TRUE)"
+    if status.motion_possible is TRUE and detail.inhibits:
+        return f"motion_possible is TRUE, so there must be no inhibits, not {detail.inhibits[0].name}"
+    if detail.errors and detail.errors[0].code != status.error_code:
+        return f"error_code must be the code of the first error, {detail.errors[0].code}, not {status.error_code}"
+    return None
+
+
+def _knows_nothing(status: RobotStatus) -> bool:
+    """With a lost link every field is UNKNOWN. Only in_error may be TRUE (`link_loss_is_error`)."""
+    names = (field.name for field in STATES if field.name != "in_error")
+    return status.in_error is not FALSE and all(getattr(status, name).name == "UNKNOWN" for name in names)
+
+
+def _wrong_detail(detail: object) -> str | None:
+    if not isinstance(detail, Detail):
+        return f"the detail must be a Detail, not {detail!r}"
+    for name, allowed, what in _MEMBERS:
+        if not allowed(getattr(detail, name)):
+            return f"{name}: must be {what}, not {getattr(detail, name)!r}"
+    if any(error.code == 0 for error in detail.errors):
+        return "errors: the code of an error must not be 0"
+    return None
+
+
+def _is_id(value: object) -> bool:
+    return value is None or (_is_number(value) and value in IDS)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value in CODES
+
+
+def _is_error(value: object) -> bool:
+    return isinstance(value, ErrorCause) and _is_number(value.code) and _is_reason(value)
+
+
+def _is_reason(value: object) -> bool:
+    return (
+        isinstance(value, ErrorCause | Inhibit)
+        and isinstance(value.name, str)
+        and isinstance(value.text, str | None)
+        and type(value.since_us) is int
+    )
+
+
+def _is_vehicle(value: object) -> bool:
+    return (
+        isinstance(value, Vehicle)
+        and all(isinstance(getattr(value, name), str | None) for name in Vehicle._fields if name != "custom_mode")
+        and (value.custom_mode is None or type(value.custom_mode) is int)
+    )
+
+
+_MEMBERS: Final[tuple[tuple[str, Callable[[object], bool], str], ...]] = (
+    ("system", _is_id, "an id from 0 to 255 or None"),
+    ("component", _is_id, "an id from 0 to 255 or None"),
+    ("errors", lambda v: isinstance(v, tuple) and all(map(_is_error, v)), "a tuple of ErrorCause"),
+    (
+        "inhibits",
+        lambda v: isinstance(v, tuple) and all(isinstance(i, Inhibit) and _is_reason(i) for i in v),
+        "a tuple of Inhibit",
+    ),
+    ("vehicle", _is_vehicle, "a Vehicle"),
+    ("link", lambda v: isinstance(v, LinkState), "a LinkState"),
+)

@@ -1,0 +1,61 @@
+"""The interface of a link. A link carries bytes and knows no MAVLink."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import NamedTuple, Protocol
+
+Address = Hashable
+"""The source of received bytes. Each connection of a stream has an address of its own, so that the bytes of two
+connections are never joined. In `send` the address selects one peer of a link with several."""
+
+
+class Received(NamedTuple):
+    """The result of one read: a datagram, or a piece of a stream."""
+
+    data: bytes
+    source: Address
+
+
+class Link(Protocol):
+    """One open link. No method blocks, and no method raises because of the peer.
+
+    The owner of a link waits until `fileno` is readable, then calls `receive`. It calls `service` when that is `due`.
+    """
+
+    text: str
+    """What the link does, for the log: `listening on 127.0.0.1:14550/udp`."""
+    stream: bool
+    """True if a read can end within a frame (serial, TCP); False for datagrams."""
+
+    @property
+    def dropped(self) -> int:
+        """How many sends failed, plus how many received datagrams the kernel has dropped."""
+
+    def fileno(self) -> int:
+        """The descriptor to poll for input; -1 after `close`, and while the link has no socket yet.
+
+        Otherwise it stays the same until `close`. A link that reconnects, or has several connections, returns the
+        descriptor of an epoll that contains its sockets. Such a descriptor may be readable although no data waits.
+        """
+
+    def receive(self, limit: int = 64) -> list[Received]:
+        """The pieces that wait, at most `limit`; empty if none does. With a limit of 1 there is only one read.
+
+        If the connection is broken, the link closes it, and `service` is due at once.
+        """
+
+    def send(self, data: bytes, to: Address = None) -> bool:
+        """Send without waiting; False if that failed, which `dropped` counts. Never sends only a part of `data`.
+
+        On a link with several peers `to` is one of them; None: all peers of a TCP server.
+        """
+
+    def due(self) -> float:
+        """When `service` has work, in monotonic seconds; infinity: never, -infinity: now."""
+
+    def service(self, now: float) -> None:
+        """Do the work that is due at `now` (monotonic seconds): connect, reconnect, time out."""
+
+    def close(self) -> None:
+        """Close the sockets or the device. May be called again."""

@@ -1,0 +1,248 @@
+"""UDP links: listen on a port, send to a port, broadcast until a peer answers. IPv4 and IPv6."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import math
+import os
+import random
+import socket
+import struct
+from contextlib import suppress
+from typing import Any
+
+from mav_robot_status.errors import LinkError
+from mav_robot_status.links.base import Address, Received
+from mav_robot_status.links.listen import LocalPort
+from mav_robot_status.links.resolve import CHECK_AGAIN, Lookup, Target
+from mav_robot_status.links.retry import Backoff, RandomFraction, StateLog
+from mav_robot_status.links.url import Url, host_port
+
+log = logging.getLogger(__name__)
+
+RECEIVE_BUFFER = 4 << 20
+"""Bytes of the receive buffer that we request: seconds of traffic while the process is not scheduled."""
+RESOLVE_WAIT = 0.2
+"""Seconds that opening waits for a name, so that a name that resolves is ready for the first send."""
+RETRY = 0.2, 5.0
+"""Seconds between attempts to resolve a name or to bind to a missing address: first, longest."""
+ANSWER_SILENCE = 30.0
+"""Seconds of silence of the peer that answered, after which the link broadcasts again."""
+
+_MAX_DATAGRAM = 65535
+_SO_RCVBUFFORCE = 33  # Linux; Python has no names for these
+_SO_MEMINFO = 55
+_MEMINFO = struct.Struct("9I")  # the last word counts the datagrams that the kernel dropped
+
+_UNREACHABLE = dict.fromkeys((errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN, errno.ENODEV, errno.EPERM), "")
+"""Send errors that persist until a person acts, with a text where the system's text is not clear. All other errors,
+such as a full buffer, concern one datagram."""
+_UNREACHABLE[errno.EACCES] = "that is a broadcast address; write udpbcast: to send to it"
+_MAX_UNREACHABLE = 16
+
+SocketAddress = tuple[Any, ...]
+
+
+class UdpLink:
+    """A UDP socket as a `Link`: the common part of the kinds."""
+
+    stream = False
+
+    def __init__(self, url: Url, fraction: RandomFraction = random.random) -> None:
+        self.text = url.words()
+        self._unsent = self._overflowed = 0
+        self._socket: socket.socket | None = None
+        self._peer: SocketAddress | None = None
+        self._unreachable: dict[SocketAddress, str] = {}
+        self._due = math.inf
+        self._backoff = Backoff(*RETRY, fraction)
+        self._state_log = StateLog(log)
+
+    def fileno(self) -> int:
+        """The descriptor of the socket; -1 after `close`, and before the name of the peer is resolved."""
+        return self._socket.fileno() if self._socket else -1
+
+    @property
+    def port(self) -> int:
+        """The local port; 0 without a socket."""
+        return int(self._socket.getsockname()[1]) if self._socket else 0
+
+    @property
+    def dropped(self) -> int:
+        """How many sends failed, plus how many datagrams the kernel dropped because the receive buffer was full."""
+        if self._socket is not None:
+            with suppress(OSError, struct.error):  # closed, or the kernel does not support this
+                meminfo = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size)
+                self._overflowed = _MEMINFO.unpack(meminfo)[-1]
+        return self._unsent + self._overflowed
+
+    def receive(self, limit: int = 64) -> list[Received]:
+        """The datagrams that wait, at most `limit`; `source` is the socket address of the sender."""
+        pieces: list[Received] = []
+        if self._socket is None:
+            return pieces
+        receive, new = self._socket.recvfrom, tuple.__new__  # recvfrom's pair is what a Received holds
+        try:
+            for _ in range(limit):
+                pieces.append(new(Received, receive(_MAX_DATAGRAM)))
+        except OSError:  # nothing waits; or the error of an earlier send, which this read has cleared
+            pass
+        return pieces
+
+    def send(self, data: bytes, to: Address = None) -> bool:
+        """Send to `to`, a source from `receive`, or to the peer. False if it was not sent."""
+        target = to if isinstance(to, tuple) else self._peer
+        if self._socket is not None and target is not None:
+            try:
+                self._socket.sendto(data, target)
+            except OSError as error:  # full, refused, unreachable, too long: a datagram is lost, the link is not
+                self._log_unreachable(target, error)
+            else:
+                if self._unreachable:
+                    self._log_reachable(target)
+                return True
+        self._unsent += 1
+        return False
+
+    def due(self) -> float:
+        """When `service` has work."""
+        return self._due
+
+    def service(self, now: float) -> None:
+        """Do the work that is due at `now`."""
+        if now >= self._due:
+            self._due = math.inf
+            self._do_due(now)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._due = math.inf
+        if self._socket:
+            self._unsent, self._overflowed = self.dropped, 0  # the kernel has no count after closing
+            self._socket.close()
+
+    def _do_due(self, now: float) -> None:
+        """The work of this kind when it is due."""
+
+    def _log_unreachable(self, target: SocketAddress, error: OSError) -> None:
+        """Log once that a target is unreachable. Bounded, because there may be a target for every address."""
+        if error.errno in _UNREACHABLE:
+            why = _UNREACHABLE[error.errno] or os.strerror(error.errno).lower()
+            if self._unreachable.get(target) != why and len(self._unreachable) < _MAX_UNREACHABLE:
+                self._unreachable[target] = why
+                log.warning("%s: cannot send to %s: %s", self.text, host_port(*target[:2]), why)
+
+    def _log_reachable(self, target: SocketAddress) -> None:
+        if self._unreachable.pop(target, None):
+            log.info("%s: can send to %s again", self.text, host_port(*target[:2]))
+
+
+class UdpListener(UdpLink):
+    """Kind `udpin`: binds a port exclusively, without SO_REUSEADDR and SO_REUSEPORT.
+
+    If this machine does not have the address, the link waits for it.
+    """
+
+    def __init__(self, url: Url, fraction: RandomFraction = random.random) -> None:
+        """Open it. Raises LinkError if the port is in use or not allowed, or the host is unknown."""
+        super().__init__(url, fraction)
+        self._local_port = LocalPort(url, _new_socket, socket.SOCK_DGRAM, self._state_log)
+        self._socket = self._local_port.bind()
+        self.text = self._local_port.text
+        self._due = math.inf if self._socket else -math.inf
+
+    def _do_due(self, now: float) -> None:
+        self._socket = self._local_port.try_bind()
+        self.text = self._local_port.text
+        self._due = math.inf if self._socket else self._backoff.after(now)
+
+
+class UdpSender(UdpLink):
+    """Kind `udpout`: sends to one peer and receives from every address.
+
+    A name that does not resolve yet is not an error; until it does, every send counts as dropped.
+    """
+
+    def __init__(self, url: Url, fraction: RandomFraction = random.random) -> None:
+        """Open it. Raises LinkError if this machine does not support the address family."""
+        super().__init__(url, fraction)
+        self._host = url.host
+        self._lookup = Lookup(url.host, url.port, socket.SOCK_DGRAM)
+        found = self._lookup.result(RESOLVE_WAIT)
+        if found:
+            self._open(found[0])
+        else:
+            self._due = -math.inf
+
+    def _open(self, target: Target) -> None:
+        """Create the socket. It stays unconnected: the peer may answer from another address."""
+        try:
+            self._socket = _new_socket(target[0])
+        except OSError as error:
+            raise LinkError(f"{self.text}: {error.strerror}") from None
+        self._peer = target[1]
+        self._state_log.recovered(f"{self.text}: {self._host} is {self._peer[0]}")
+
+    def _do_due(self, now: float) -> None:
+        found = self._lookup.result()
+        if found is None:
+            self._due = now + CHECK_AGAIN
+            return
+        try:
+            if found:
+                self._open(found[0])
+                return
+            self._state_log.down(f"{self.text}: the name {self._host} does not resolve yet, trying again")
+        except LinkError as problem:
+            self._state_log.down(str(problem))
+        self._due = self._backoff.after(now)
+
+
+class UdpBroadcaster(UdpSender):
+    """Kind `udpbcast`: broadcasts until a peer answers, then sends to that peer until it falls silent."""
+
+    _broadcast_address: SocketAddress | None = None
+    _answered = False
+
+    def receive(self, limit: int = 64) -> list[Received]:
+        """The datagrams that wait; the first sender becomes the peer."""
+        pieces = super().receive(limit)
+        if pieces and self._peer == self._broadcast_address:
+            peer: Any = pieces[0].source
+            self._peer = peer
+            self._state_log.up(f"{self.text}: {host_port(*peer[:2])} answers, sending to it")
+        if any(piece.source == self._peer for piece in pieces):
+            self._answered = True
+            self._due = -math.inf
+        return pieces
+
+    def _open(self, target: Target) -> None:
+        super()._open(target)
+        assert self._socket is not None
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._broadcast_address = self._peer
+
+    def _do_due(self, now: float) -> None:
+        if self._socket is None:
+            super()._do_due(now)
+        elif self._answered:
+            self._answered = False
+            self._due = now + ANSWER_SILENCE
+        else:
+            assert self._peer is not None
+            self._state_log.down(f"{self.text}: {host_port(*self._peer[:2])} is silent, broadcasting again")
+            self._peer = self._broadcast_address
+
+
+def _new_socket(family: int) -> socket.socket:
+    """A non-blocking socket. Its receive buffer is as large as the system allows."""
+    new = socket.socket(family, socket.SOCK_DGRAM)
+    new.setblocking(False)
+    try:
+        new.setsockopt(
+            socket.SOL_SOCKET, _SO_RCVBUFFORCE, RECEIVE_BUFFER
+        )  # beyond the limit of the system: only for root
+    except OSError:
+        new.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+    return new

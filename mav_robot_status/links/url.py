@@ -1,0 +1,69 @@
+"""Connection strings: the forms of pymavlink, MAVSDK and mavlink-router, and those of kinds from other packages."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import stat
+from typing import NoReturn
+
+from mav_robot_status.errors import UsageError
+from mav_robot_status.links import kinds
+from mav_robot_status.links.forms import ADDRESS, BARE_HOST_PORT, DEVICE_BAUD
+from mav_robot_status.links.kind import Url, host_port
+from mav_robot_status.links.kinds import BY_SCHEME, KINDS, LOG, SERIAL, UDP_LISTENER, UDP_SENDER
+
+__all__ = ["KINDS", "Url", "help_text", "host_port", "parse"]
+
+_SCHEME = re.compile(r"([A-Za-z][\w+-]*):(?://)?(.*)", re.ASCII | re.DOTALL)
+_EXAMPLES = ", ".join(kind.example for kind in (UDP_LISTENER, SERIAL, LOG))
+
+
+def help_text() -> str:
+    """The forms of a CONNECTION: one line for each kind, and its forms below it."""
+    rows = kinds.every_kind()
+    return "\n".join(f"  {kind.example:<30}{kind.description}\n  {'':<30}{kind.forms}" for kind in rows)
+
+
+def parse(text: str, baud: int | None = None) -> Url:
+    """What `text` means; `baud` (bits per second) applies to a serial device whose text has no rate.
+
+    Raises UsageError, one line that says what is wrong and what to write instead.
+    """
+    found = _SCHEME.fullmatch(text)
+    scheme, rest = (found[1].lower(), found[2]) if found else ("", text)
+    kind = BY_SCHEME.get(scheme)
+    if kind is None:
+        if os.path.isfile(text) or text.lower().endswith(".tlog"):
+            return LOG.url(text, text, baud)
+        if text.startswith("/dev/") or _is_device(text):
+            return SERIAL.url(text, text, baud)
+        kind = kinds.installed(scheme) if scheme else None
+    if kind is not None:
+        return kind.url(text, rest, baud)
+    if BARE_HOST_PORT.fullmatch(text):
+        return UDP_SENDER.url(text, text, baud)
+    return _refuse(text, scheme)
+
+
+def _refuse(text: str, scheme: str) -> NoReturn:
+    """Raise UsageError for a text that is no connection string."""
+    if scheme and (near := difflib.get_close_matches(scheme, kinds.schemes(), 1)):
+        written = text[: len(scheme)]
+        raise UsageError(f"{text!r}: unknown connection type {written}:; did you mean {near[0]}: ?")
+    if ADDRESS.fullmatch(text):
+        raise UsageError(f"{text!r} has no port; write {text}:14550 to send there, or udp:{text}:14550 to listen")
+    if os.path.isdir(text):
+        raise UsageError(f"{text!r} is a folder; write the path of a recorded .tlog or of a serial device")
+    if "/" in text and not scheme:
+        raise UsageError(f"{text!r}: no such file; write the path of a recorded .tlog or of a serial device")
+    raise UsageError(f"{text!r} is neither a connection nor a file that exists; write for example {_EXAMPLES}")
+
+
+def _is_device(text: str) -> bool:
+    """Whether a path outside /dev (a link to a terminal, as socat makes them) leads to a character device."""
+    try:
+        return stat.S_ISCHR(os.stat(DEVICE_BAUD.fullmatch(text)[1]).st_mode)  # type: ignore[index]  # matches any text
+    except (OSError, ValueError):
+        return False

@@ -1,0 +1,143 @@
+"""Rate limits for MAVLink publishers, for each audience and each handle separately."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections import deque
+from typing import TYPE_CHECKING, ClassVar, Final, Generic, TypeVar
+
+from ..interface import LinkState
+from ..interface.options import Options
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable
+
+    from ..clock import Instant
+    from ..interface import Audience, PublisherContext, RobotStatusMsg
+
+MOST_CHANGES: Final = 5
+WINDOW: Final = 1.0  # s
+SLACK: Final = 0.01  # s: a message this much early still counts as periodic
+
+S = TypeVar("S")
+
+
+class Schedule:
+    """The last messages about one handle, sent to one audience, and their times."""
+
+    __slots__ = ("_changes", "_content", "_last", "_settled")
+
+    def __init__(self) -> None:
+        self._last = -math.inf
+        """The nominal time of the last periodic message. It keeps the phase."""
+        self._content: object = None
+        self._changes: deque[float] = deque(maxlen=MOST_CHANGES)
+        self._settled: RobotStatusMsg | None = None
+
+    def due(self, msg: RobotStatusMsg, content: object, interval: float, now: float) -> float:
+        """When to send `msg`: `now` (it then counts as sent), a later time, or inf for never.
+
+        A message is due once in `interval` seconds, and earlier if its content differs from the last one sent, at most
+        MOST_CHANGES times in WINDOW.
+        """
+        if msg is self._settled:
+            return math.inf
+        periodic = now - self._last >= interval - SLACK
+        changed = content != self._content
+        if not periodic and changed and len(self._changes) == MOST_CHANGES and now < self._changes[0] + WINDOW:
+            return min(self._changes[0] + WINDOW, self._last + interval)
+        self._settled = msg
+        if not periodic and not changed:
+            return math.inf
+        if periodic:
+            # a fixed phase: otherwise jitter adds up and lowers the rate
+            late = now - self._last >= 2 * interval
+            self._last = now if late else self._last + interval
+        else:
+            self._changes.append(now)
+        self._content = content
+        return now
+
+
+class RateLimitedPublisher(ABC, Generic[S]):
+    """Holds the last message of each handle, and a state `S` for each handle and audience.
+
+    A new audience gets the last message of each handle at once. The state of a gone audience is deleted. Nothing is
+    sent about a vehicle before its first heartbeat.
+    """
+
+    periodic = True
+    live_only = True
+    name: ClassVar[str]
+    state_type: ClassVar[type]
+    """The class S."""
+
+    options_type = Options
+
+    def __init__(self, context: PublisherContext) -> None:
+        """Raises UsageError for an option: there are none."""
+        Options.read(self.name, context.options)
+        self._port = context.mavlink
+        self._audiences: list[Audience] = []
+        self._states: dict[Hashable, dict[str, S]] = {}
+        self._latest: dict[str, RobotStatusMsg] = {}
+        self._waiting: dict[str, None] = {}
+        """Handles with a message that may be due, in order of arrival."""
+
+    @abstractmethod
+    def wants(self, audience: Audience) -> bool:
+        """True if this audience gets messages."""
+
+    @abstractmethod
+    def send_due(self, msg: RobotStatusMsg, system: int, audience: Audience, state: S, now: float) -> float:
+        """Send a message if it is due; return when a delayed message will be due, or inf."""
+
+    def busy(self) -> bool:
+        """Never. A message beyond the limit is delayed, and a newer one replaces it."""
+        return False
+
+    @property
+    def queued(self) -> int:
+        """Handles with a delayed message."""
+        return len(self._waiting)
+
+    def publish(self, msg: RobotStatusMsg) -> None:
+        """Hold the message. `service` follows every round of updates and sends it to audiences for which it is due."""
+        if msg.detail.system is None or msg.detail.link is LinkState.NEVER_SEEN:
+            self._latest.pop(msg.handle, None)
+            return
+        self._latest[msg.handle] = msg
+        self._waiting[msg.handle] = None
+
+    def service(self, now: Instant) -> float | None:
+        """Send due messages; return when a delayed change will be due."""
+        audiences = [audience for audience in self._port.audiences() if self.wants(audience)]
+        if audiences != self._audiences:
+            self._audiences = audiences
+            self._states = {a.key: self._states.get(a.key, {}) for a in audiences}
+            self._waiting = dict.fromkeys(self._latest)
+        again, waiting, self._waiting = math.inf, self._waiting, {}
+        for handle in waiting:
+            due = self._send_to_all(handle, now.mono)
+            if due < math.inf:
+                self._waiting[handle] = None
+                again = min(again, due)
+        return None if again == math.inf else again
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def _send_to_all(self, handle: str, now: float) -> float:
+        """Send the message of one handle to every audience; return when a delayed message will be due."""
+        msg = self._latest.get(handle)
+        if msg is None or msg.detail.system is None:
+            return math.inf
+        due = math.inf
+        for audience in self._audiences:
+            states = self._states[audience.key]
+            state = states.get(handle)
+            if state is None:
+                state = states[handle] = self.state_type()
+            due = min(due, self.send_due(msg, msg.detail.system, audience, state, now))
+        return due

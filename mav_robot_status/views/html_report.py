@@ -1,0 +1,205 @@
+"""Timelines as one self-contained HTML file, or as JSON.
+
+Texts from the wire and file names are hostile. They enter the page as JSON that cannot close its element, and become
+text nodes only. The page's policy allows its own script and style by their hashes, and no network.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import os
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, Final
+
+from ..clock import rfc3339
+from ..errors import LinkError, UsageError
+from ..interface import STATES, Kind, LinkState, RobotMode
+from .timeline import TRACKS, Span
+from .totals import totals
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from .timeline import Reason, Timeline, VehicleTimeline
+    from .totals import ReasonTotal
+
+WORDS: Final = {"TRUE": True, "FALSE": False, "UNKNOWN": None}
+"""The JSON of a TriState."""
+VALUES: Final[dict[str, tuple[str, ...]]] = {
+    **dict.fromkeys(TRACKS, tuple(WORDS)),
+    "link": tuple(state.value for state in LinkState),
+    "flight_mode": (),
+    **{field.name: tuple(mode.name for mode in RobotMode) for field in STATES if field.kind is Kind.MODE},
+}
+"""The values of each track. The totals list all of them, even those that never occurred."""
+ESCAPES: Final = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&"})
+"""Characters that could open or close an element; in JSON they occur in strings only."""
+
+
+# -- JSON --------------------------------------------------------------------------------------------------------------
+
+
+def as_json(timelines: Iterable[Timeline]) -> str:
+    """One JSON object in a line for each vehicle of each log. The form is documented and stable."""
+    return "\n".join(json.dumps(_vehicle(timeline, v)) for timeline in timelines for v in timeline.vehicles)
+
+
+def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> dict[str, Any]:
+    whole = totals(vehicle)
+    return {
+        "log": timeline.name,
+        "segments": [_interval(timeline, s.start, s.end) for s in timeline.segments],
+        "handle": vehicle.handle,
+        "system": vehicle.system,
+        "component": vehicle.component,
+        "vehicle": {"autopilot": vehicle.autopilot, "type": vehicle.type},
+        "totals": {
+            "seconds": _seconds(whole.watched),
+            "arm_cycles": len(whole.arm_cycles),
+            **{name: _lasted(name, whole.values[name]) for name in TRACKS},
+            "errors": [_reason_total(total) for total in whole.errors],
+            "inhibits": [_reason_total(total, code=False) for total in whole.inhibits],
+        },
+        "arm_cycles": [
+            {**_interval(timeline, c.start, c.end), "armed_seconds": _seconds(c.armed)} for c in whole.arm_cycles
+        ],
+        "intervals": {
+            **{name: [_span(timeline, name, span) for span in vehicle.tracks[name]] for name in TRACKS},
+            "errors": [{"code": r.code, **_reason(timeline, r)} for r in vehicle.errors],
+            "inhibits": [_reason(timeline, r) for r in vehicle.inhibits],
+        },
+    }
+
+
+def _lasted(track: str, values: dict[str, int]) -> dict[str, float]:
+    every = dict.fromkeys(VALUES[track], 0) | values
+    return {value: _seconds(lasted) for value, lasted in every.items() if value}
+
+
+def _interval(timeline: Timeline, start: int, end: int) -> dict[str, Any]:
+    return {
+        "start": rfc3339(timeline.unix_us(start, start)),
+        "end": rfc3339(timeline.unix_us(start, end)),
+        "seconds": _seconds(end - start),
+    }
+
+
+def _span(timeline: Timeline, track: str, span: Span) -> dict[str, Any]:
+    value: str | bool | None = WORDS[span.value] if VALUES[track] == tuple(WORDS) else span.value or None
+    return {"value": value, **_interval(timeline, span.start, span.end), "rule": span.rule, "source": span.source}
+
+
+def _reason(timeline: Timeline, reason: Reason) -> dict[str, Any]:
+    return {"name": reason.name, "text": reason.text, **_interval(timeline, reason.start, reason.end)}
+
+
+def _reason_total(total: ReasonTotal, code: bool = True) -> dict[str, Any]:
+    named = {"code": total.code} if code else {}
+    return {
+        **named,
+        "name": total.name,
+        "count": total.occurrences,
+        "seconds": _seconds(total.active),
+        "texts": list(total.texts),
+    }
+
+
+def _seconds(us: int) -> float:
+    return round(us / 1e6, 6)
+
+
+# -- the page ----------------------------------------------------------------------------------------------------------
+
+
+def as_html(timelines: Sequence[Timeline], made_by: str) -> str:
+    """The page."""
+    script, style = _asset("report.js"), _asset("report.css")
+    policy = (
+        f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
+    parts = {
+        "policy": policy,
+        "title": html.escape(", ".join(timeline.name for timeline in timelines)),
+        "style": style,
+        "script": script,
+        "data": embedded({"by": made_by, "logs": [_page_log(timeline) for timeline in timelines]}),
+    }
+    page, *rest = _asset("report.html").split("{{")  # each part is inserted once and not scanned again
+    for piece in rest:
+        name, _, following = piece.partition("}}")
+        page += parts[name] + following
+    return page
+
+
+def save(page: str, path: str) -> None:
+    """Write the page. Raises UsageError if the path exists and is not an HTML file, LinkError if the write fails."""
+    if os.path.exists(path) and not path.lower().endswith((".html", ".htm")):
+        raise UsageError(f"{path} exists and is not an .html file, so it is not overwritten; write -o FILE.html")
+    try:
+        with open(path, "w", encoding="utf-8", errors="replace", newline="") as file:
+            file.write(page)
+    except (OSError, ValueError) as problem:
+        reason = (problem.strerror if isinstance(problem, OSError) else None) or "not a file name"
+        raise LinkError(f"cannot write the report {path!r}: {reason}") from None
+
+
+def embedded(data: Any) -> str:
+    """JSON for a script element."""
+    return json.dumps(data, separators=(",", ":")).translate(ESCAPES)
+
+
+def _page_log(timeline: Timeline) -> dict[str, Any]:
+    strings = _Numbered()
+    vehicles = [_page_vehicle(vehicle, strings) for vehicle in timeline.vehicles]
+    return {"name": timeline.name, "segments": timeline.segments, "vehicles": vehicles, "strings": list(strings)}
+
+
+def _page_vehicle(vehicle: VehicleTimeline, strings: _Numbered) -> dict[str, Any]:
+    by_name: dict[str, dict[str, list[Span | Reason]]] = {"errors": {}, "inhibits": {}}
+    for kind, found in by_name.items():
+        for reason in getattr(vehicle, kind):
+            found.setdefault(reason.name, []).append(reason)
+    whole = totals(vehicle)
+    return {
+        "name": f"{vehicle.system}.{vehicle.component}",
+        "handle": vehicle.handle,
+        "autopilot": vehicle.autopilot,
+        "type": vehicle.type,
+        "tracks": {name: _packed(spans, strings) for name, spans in vehicle.tracks.items()},
+        **{kind: {name: _packed(r, strings) for name, r in found.items()} for kind, found in by_name.items()},
+        "totals": whole._asdict() | {name: [t._asdict() for t in getattr(whole, name)] for name in _LISTS},
+    }
+
+
+def _packed(spans: Sequence[Span | Reason], strings: _Numbered) -> list[int]:
+    """Four numbers for each span: the gap before it, its length, its value or text, and its evidence."""
+    packed: list[int] = []
+    before = 0
+    for span in spans:
+        value, why = (span.value, (span.rule, span.source)) if isinstance(span, Span) else (span.text, None)
+        packed += span.start - before, span.end - span.start, strings[value], strings[why]
+        before = span.end
+    return packed
+
+
+class _Numbered(dict[Any, int]):
+    """Numbers texts, so that a repeated text is stored once."""
+
+    def __missing__(self, text: Any) -> int:
+        self[text] = len(self)
+        return self[text]
+
+
+_LISTS: Final = ("arm_cycles", "errors", "inhibits")
+
+
+def _asset(name: str) -> str:
+    return (files(__package__) / "assets" / name).read_text("utf-8")
+
+
+def _hash(code: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()}"

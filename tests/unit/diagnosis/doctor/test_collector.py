@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mav_robot_status.clock import Instant, later
+from mav_robot_status.diagnosis.doctor.collector import HEAD, MOST_SOURCES, MOST_SPEAKERS, Collector
+from mav_robot_status.diagnosis.doctor.findings import Findings
+from mav_robot_status.links.url import parse
+from mav_robot_status.mavlink.definitions import Attitude, Heartbeat, SystemTime
+from mav_robot_status.mavlink.encode import encode
+
+START = Instant(100.0, 1_800_000_000_000_000)
+ROVER, COPTER, GIMBAL = Heartbeat(0, 10, 3, 65, 4, 3), Heartbeat(0, 2, 3, 81, 3, 3), Heartbeat(0, 26, 8, 0, 4, 3)
+A, B = ("10.0.0.1", 14550), ("10.0.0.2", 14550)
+
+
+class Ear:
+    """A collector that receives messages."""
+
+    def __init__(self) -> None:
+        self.collector = Collector()
+        self._sequence = 0
+
+    def hear(self, message: Any, at: float = 0.0, source: Any = A, **options: Any) -> None:
+        frame = encode(message, **{"system": 1, "component": 1, "sequence": self._sequence % 256, **options})
+        self._sequence += 1
+        self.collector.on_data(frame, source, later(START, at))
+
+    @property
+    def found(self) -> Findings:
+        return self.collector.findings(Findings(parse("udp:127.0.0.1:1"), ""), {})
+
+
+@pytest.fixture
+def ear() -> Ear:
+    return Ear()
+
+
+def attitude(boot_ms: float) -> Attitude:
+    return Attitude(round(boot_ms), 0.0, 0.0, 0.0)
+
+
+def test_senders_messages_and_rates_are_counted(ear: Ear) -> None:
+    for beat in range(5):
+        ear.hear(ROVER, beat)
+        ear.hear(GIMBAL, beat, component=154, version=1)
+    ear.hear(attitude(0), 4)
+    rover, gimbal = ear.found.speakers
+    assert (rover.pilot, rover.autopilot, rover.type, rover.frames, rover.frames_v1) == (True, 3, 10, 6, 0)
+    assert (rover.counts, rover.rates) == ({0: 5, 30: 1}, {0: 1.0})
+    assert (gimbal.pilot, gimbal.type, gimbal.frames_v1) == (False, 26, 5)
+    assert ear.found.sources == ("10.0.0.1:14550",)
+    assert ear.found.counters.frames == 11
+
+
+def test_a_split_frame_is_reassembled_for_each_sender(ear: Ear) -> None:
+    frame = encode(ROVER, system=1, component=1, sequence=0)
+    for part in (frame[:9], frame[9:]):
+        for source in (A, B):
+            ear.collector.on_data(part, source, START)
+    assert ear.found.counters.frames == 2
+    assert ear.collector.has_heartbeat()
+
+
+def test_an_unverifiable_frame_is_counted_without_a_sender(ear: Ear) -> None:
+    frame = bytearray(encode(ROVER, system=9, component=9, sequence=0))
+    frame[7:10] = (40_000).to_bytes(3, "little")
+    ear.collector.on_data(bytes(frame) * 2, A, START)
+    assert ear.found.counters.unknown == {40_000: 2}
+    assert ear.found.speakers == ()
+
+
+def test_a_flood_uses_bounded_memory(ear: Ear) -> None:
+    for number in range(MOST_SPEAKERS * 2):
+        ear.hear(ROVER, source=("10.0.0.1", number), system=number % 256, component=1 + number // 256)
+    ear.hear(ROVER, source="late", system=1, component=1)
+    assert len(ear.found.speakers) == MOST_SPEAKERS
+    assert len(ear.collector._parsers) <= MOST_SOURCES + 1
+    assert len(ear.found.head) == HEAD
+    assert ear.found.counters.frames == MOST_SPEAKERS * 2 + 1
+
+
+def test_alternating_autopilots_are_two_and_a_replaced_one_is_not(ear: Ear) -> None:
+    ear.hear(ROVER)
+    ear.hear(COPTER, 1)
+    assert ear.found.speakers[0].conflict == ""
+    ear.hear(ROVER, 2)
+    assert "ARDUPILOTMEGA QUADROTOR and of ARDUPILOTMEGA GROUND_ROVER" in ear.found.speakers[0].conflict
+
+
+def test_a_component_with_the_ids_of_the_autopilot_is_not_a_second_vehicle(ear: Ear) -> None:
+    for beat in range(4):
+        ear.hear((ROVER, GIMBAL)[beat % 2], beat)
+    assert ear.found.speakers[0].conflict == ""
+
+
+def test_two_alternating_boot_clocks_are_two_autopilots(ear: Ear) -> None:
+    ear.hear(attitude(0), 0, A)
+    ear.hear(SystemTime(0, 60_000), 0, B)
+    ear.hear(attitude(1000), 1, A)
+    assert ear.found.speakers[0].conflict == ""
+    ear.hear(SystemTime(0, 61_000), 1, B)
+    assert ear.found.speakers[0].conflict == "clocks in turns that started 60 s apart"
+
+
+def test_reboots_and_paths_with_different_delays_are_one_autopilot(ear: Ear) -> None:
+    for boot in range(6):  # each boot restarts the clock
+        for at in range(3):
+            ear.hear(attitude(at * 1000), boot * 60 + at)
+    for at in range(400, 420):
+        ear.hear(attitude(at * 1000), at, A)
+        ear.hear(attitude((at - 4) * 1000), at, B)
+    assert ear.found.speakers[0].conflict == ""
+
+
+def test_a_clock_counts_only_if_its_time_is_set(ear: Ear) -> None:
+    ear.hear(SystemTime(0, 5))
+    assert ear.found.speakers[0].clock_off is None
+    ear.hear(SystemTime(START.unix_us + 90_000_000, 5))
+    assert ear.found.speakers[0].clock_off == 90.0

@@ -1,0 +1,184 @@
+"""The tables of what a message can change: `MOVES` and the `unsettled` marks. An omission would give a stale status.
+
+Stories and random flights reach every row and every mark, so the check is known to see an omission of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from struct import pack
+from typing import Any, Final
+
+import pytest
+
+from mav_robot_status.hardware.mavlink.handlers import HANDLERS
+from mav_robot_status.mavlink import definitions as mav
+
+from . import driver
+from .driver import ACTIVE, CRITICAL, FITTED, GYRO, PREARM, TERMINATED, Flight, copter, px4, rover
+from .random_flights import MESSAGES, fly
+from .settled import ROWS, Changes, Mark, Witness, ignore_table, marks, omissions, switch_off
+from .test_sequences import Outputs
+
+SEEDS: Final = range(4)
+
+
+def held(flight: Flight, stop: list[int], driven: list[int]) -> Flight:
+    """The motor outputs return to their stop value while throttle is demanded."""
+    outputs = Outputs(flight, stop)
+    flight.wait(15)
+    flight.hb(armed=True, state=ACTIVE)
+    outputs.set(driven, 39)
+    flight.wait(3)
+    outputs.set(stop, 100)
+    flight.wait(3)
+    return flight
+
+
+def a_rover_turns_while_its_outputs_are_held() -> None:
+    flight = rover()
+    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0, 0, 0))
+    held(flight, [1500, 0, 1500], [1500, 0, 1700])
+    flight.stop("attitude").send(mav.Attitude(flight.boot_ms, 0, 0, 1.0))
+    flight.send(mav.ParamValue(70.0, 0, 0, b"SERVO3_FUNCTION", 2))
+
+
+def a_motor_stops_turning_while_its_output_is_at_the_stop_value(make: Callable[[bytes], Any], rpm: str) -> None:
+    flight = copter()
+    outputs = Outputs(flight, [1000] * 4)
+    flight.wait(15)
+    flight.hb(armed=True, state=ACTIVE).wait(2)
+    outputs.set([1000] * 4, 0)
+    flight.send(make(pack(rpm, 900, 0, 0, 0))).send(make(pack(rpm, 0, 0, 0, 0)))
+
+
+def parameters_arrive_while_a_motor_turns() -> None:
+    flight = copter()
+    outputs = Outputs(flight, [1000] * 4)
+    flight.wait(15)
+    flight.hb(armed=True, state=ACTIVE).wait(2)
+    outputs.set([1000] * 4, 0)
+    flight.send(mav.EscStatus(0, pack("<4i", 900, 0, 0, 0), b"", b"", 0))
+    flight.send(mav.ParamValue(33.0, 0, 0, b"SERVO5_FUNCTION", 2))
+    flight.send(mav.ParamValue(165.0, 0, 0, b"RC7_OPTION", 2))
+
+
+def a_copter_climbs_while_its_outputs_are_held_and_then_drives_them() -> None:
+    flight = held(copter(), [1000] * 4, [1632] * 4)
+    flight.stop("vfr_hud", "outputs").send(mav.VfrHud(0.0, 2.0, 100))
+    flight.send(mav.ServoOutputRaw._make((*[1632] * 8, 0, *[0] * 8)))
+
+
+def a_motor_is_driven_after_a_stop_was_announced() -> None:
+    flight = copter()
+    outputs = Outputs(flight, [1000] * 4)
+    flight.wait(15)
+    flight.hb(armed=True, state=ACTIVE)
+    outputs.set([1632] * 4, 39)
+    flight.wait(3)
+    flight.text("RC7: MotorEStop HIGH", 2).wait(1)
+
+
+def an_autopilot_shows_late_that_it_is_inav() -> None:
+    flight = copter()
+    flight.wait(5)
+    flight.set(present=GYRO).wait(2)
+
+
+def internal_errors_end_after_they_were_announced() -> None:
+    flight = copter().hb(armed=True, state=ACTIVE).set(internal_errors=1)
+    flight.wait(2)
+    flight.text("Internal Errors 0x400", 2).set(internal_errors=0).wait(2)
+
+
+def a_vehicle_without_a_global_position_starts_to_move() -> None:
+    flight = px4()
+    flight.stream("rest", lambda: mav.LocalPositionNed(flight.boot_ms, 0, 0, 0), hz=4).wait(3)
+    flight.stop("rest").stream("motion", lambda: mav.LocalPositionNed(flight.boot_ms, 2, 0, 0), hz=4).wait(3)
+
+
+def a_vehicle_stays_armed_after_it_announces_a_termination() -> None:
+    flight = Flight(driver.ARDUPILOT, driver.PLANE).hb(armed=True, state=ACTIVE)
+    flight.text("Terminating due to GCS request", 0).wait(5)
+
+
+def px4_says_that_it_stops_while_it_is_terminated() -> None:
+    flight = px4().hb(armed=True, state=TERMINATED)
+    flight.wait(2)
+    flight.text("Kill-switch engaged", 0).wait(2)
+
+
+def the_checks_pass_after_a_stop_was_said() -> None:
+    flight = copter().set(health=FITTED)
+    flight.wait(12)
+    flight.text("RC7: MotorEStop HIGH", 2).wait(3)
+    flight.set(health=FITTED | PREARM).wait(5)
+
+
+def a_failsafe_is_said_between_two_heartbeats_of_the_same_time() -> None:
+    flight = px4().hb(armed=True, state=CRITICAL)
+    flight.wait(2)
+    flight.hb(state=ACTIVE).text("Failsafe activated\t", 2).send(flight.heartbeat())
+
+
+def a_sensor_is_faulty_at_boot_and_the_clock_is_heard_late() -> None:
+    flight = copter().set(health=FITTED & ~GYRO | PREARM)
+    flight.wait(3)
+    flight.send(flight.system_time())
+
+
+STORIES: Final[list[Callable[[], Any]]] = [
+    a_rover_turns_while_its_outputs_are_held,
+    *(
+        partial(a_motor_stops_turning_while_its_output_is_at_the_stop_value, make, rpm)
+        for make, rpm in (
+            (lambda rpm: mav.EscStatus(0, rpm, b"", b"", 0), "<4i"),
+            (lambda rpm: mav.EscTelemetry1To4(b"", b"", b"", rpm, b"", b""), "<4H"),
+            (lambda rpm: mav.EscTelemetry5To8(b"", b"", b"", rpm, b"", b""), "<4H"),
+            (lambda rpm: mav.EscTelemetry9To12(b"", b"", b"", rpm, b"", b""), "<4H"),
+        )
+    ),
+    parameters_arrive_while_a_motor_turns,
+    a_copter_climbs_while_its_outputs_are_held_and_then_drives_them,
+    a_motor_is_driven_after_a_stop_was_announced,
+    an_autopilot_shows_late_that_it_is_inav,
+    internal_errors_end_after_they_were_announced,
+    a_vehicle_without_a_global_position_starts_to_move,
+    a_vehicle_stays_armed_after_it_announces_a_termination,
+    px4_says_that_it_stops_while_it_is_terminated,
+    the_checks_pass_after_a_stop_was_said,
+    a_failsafe_is_said_between_two_heartbeats_of_the_same_time,
+    a_sensor_is_faulty_at_boot_and_the_clock_is_heard_late,
+    *(partial(fly, seed) for seed in SEEDS),
+]
+
+
+@pytest.fixture
+def changes(monkeypatch: pytest.MonkeyPatch) -> Changes:
+    """The changes by the messages of a flight that have no mark."""
+    monkeypatch.setattr(driver, "MavlinkRobotHW", Witness)
+    return ignore_table(monkeypatch)
+
+
+def test_a_message_changes_no_fact_that_the_table_lacks_and_every_row_is_needed(changes: Changes) -> None:
+    for story in STORIES:
+        story()
+    assert omissions(changes) == set()
+    assert ROWS - changes == set()
+
+
+@pytest.mark.parametrize("mark", marks(), ids=lambda mark: f"{mark[0]}:{mark[1]}")
+def test_every_mark_is_needed_to_detect_all_changes(
+    mark: Mark, changes: Changes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    switch_off(mark, monkeypatch)
+    for story in STORIES:
+        story()
+        if omissions(changes):
+            return
+    pytest.fail("no story needs this mark")
+
+
+def test_random_flights_send_every_message_that_has_a_handler() -> None:
+    assert set(MESSAGES) >= set(HANDLERS)

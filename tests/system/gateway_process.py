@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -15,7 +17,8 @@ from typing import IO, Any, NamedTuple, TypeVar
 
 from ..deadline import SOON, Deadline, allow
 
-COMMAND = (sys.executable, "-m", "mav_robot_status.cli")
+COMMAND = tuple(shlex.split(os.environ.get("TESTED_COMMAND", f"{sys.executable} -m mav_robot_status.cli")))
+"""The command under test. Another version of the program can be named in the environment."""
 T = TypeVar("T")
 
 

@@ -124,7 +124,8 @@ def as_table(found: Iterable[dict[str, Any]]) -> str:
 
 def _table(one: dict[str, Any]) -> Iterator[str]:
     vehicle, link = one["vehicle"], one["link"]
-    kind = ", ".join(str(v) for v in (vehicle["autopilot"], vehicle["type"], vehicle["flight_mode"]) if v is not None)
+    names = (vehicle["autopilot"], vehicle.get("firmware"), vehicle["type"], vehicle["flight_mode"])
+    kind = ", ".join(str(name) for name in names if name is not None)
     yield f"vehicle {one['system']}.{one['component']} ({kind}), {link['state']}, at {one['stamp']}"
     rows = [("field", "value", "age", "why")]
     for name, field in one["fields"].items():

@@ -21,7 +21,7 @@ def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> dict[str, 
         "handle": handle.name,
         "system": detail.system,
         "component": detail.component,
-        "vehicle": detail.vehicle._asdict(),
+        "vehicle": detail.vehicle.members(),
         "link": {
             "state": detail.link.value,
             "heartbeat_age": None if handle.heard_at is None else round(now.mono - handle.heard_at, 3),

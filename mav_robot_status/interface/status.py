@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from .fields import RobotMode, RobotStatus, TriState
 
@@ -69,6 +69,15 @@ class Vehicle(NamedTuple):
     """HEARTBEAT.custom_mode, 0 to 4294967295. None for every other robot."""
     state: str | None = None
     """The state of the controller: MAV_STATE; of an arm, the controller's own name."""
+    firmware: str | None = None
+    """The version of the controller's firmware: `4.5.6`, `4.7.0-dev`."""
+
+    def members(self) -> dict[str, str | int | None]:
+        """The members in JSON. Those that were added later are absent while they are None."""
+        return {name: value for name, value in self._asdict().items() if value is not None or name not in _ADDED}
+
+
+_ADDED: Final = frozenset({"firmware"})
 
 
 class Evidence(NamedTuple):

@@ -66,7 +66,7 @@ def _fields(status: RobotStatus) -> str:
 
 @lru_cache(maxsize=256)
 def _vehicle(vehicle: Vehicle) -> str:
-    return json.dumps(vehicle._asdict())
+    return json.dumps(vehicle.members())
 
 
 def native(msg: RobotStatusMsg, seq: int, body: str) -> str:

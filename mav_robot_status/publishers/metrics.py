@@ -49,7 +49,7 @@ def _info(msg: RobotStatusMsg) -> Iterable[tuple[Labels, float]]:
     vehicle = msg.detail.vehicle
     if vehicle.autopilot is not None:
         names: Labels = {"autopilot": vehicle.autopilot, "type": vehicle.type or "", "state": vehicle.state or ""}
-        yield {**names, "flight_mode": vehicle.flight_mode or ""}, 1
+        yield {**names, "flight_mode": vehicle.flight_mode or "", "firmware": vehicle.firmware or ""}, 1
 
 
 VEHICLE: Final = (

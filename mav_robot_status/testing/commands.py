@@ -20,7 +20,7 @@ from .firmware import (
     not_armable,
     px4_mode,
 )
-from .messages import BUILDERS, available_modes, can_send
+from .messages import BUILDERS, autopilot_version, available_modes, can_send
 from .scenario import Text, step
 from .vehicle_model import VehicleModel
 
@@ -28,7 +28,7 @@ CUSTOM_MODE_ENABLED = 1
 FORCED = 21196
 GCS = 6
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, ARM_DISARM, DO_SET_MODE, SET_MODE = 511, 512, 400, 176, 11
-AVAILABLE_MODES = 435
+AUTOPILOT_VERSION, AVAILABLE_MODES = 148, 435
 STREAM_GROUPS = {2: (1,), 3: (36,), 6: (33, 32), 10: (30,), 11: (74,), 12: (2,)}
 """ArduPilot's stream groups: the message ids that REQUEST_DATA_STREAM starts. Group 0 means all groups."""
 INT16 = 4
@@ -73,6 +73,9 @@ def _request_message(model: VehicleModel, m: DecodedMessage) -> int:
     if m.param1 == AVAILABLE_MODES and model.firmware.modes:
         for mode in available_modes(model.firmware, int(m.param2) if math.isfinite(m.param2) else 0):
             model.send(mode)
+        return ACCEPTED
+    if m.param1 == AUTOPILOT_VERSION and model.firmware.version:
+        model.send(autopilot_version(model.firmware))
         return ACCEPTED
     if not can_send(model.firmware, m.param1):
         return UNSUPPORTED

@@ -57,6 +57,8 @@ class Firmware(NamedTuple):
     """Disarmed, all checks passed."""
     modes: tuple[Mode, ...] = ()
     """The rows of AVAILABLE_MODES; empty: the firmware does not support that message."""
+    version: int = 0
+    """AUTOPILOT_VERSION.flight_sw_version; 0: the firmware does not support that message."""
     on_request: frozenset[int] | None = None
     """The messages that a peer can request; None: all that the firmware sends."""
 

@@ -91,6 +91,7 @@ _PX4_READY = VehicleState(
 
 ARDUROVER = Firmware(
     name="ArduPilot Rover",
+    version=0x040506FF,
     type=10,
     autopilot=ARDUPILOT,
     base_modes={0: 65, 1: 65, 3: 65, 7: 65, 4: 1, 16: 65} | dict.fromkeys((5, 6, 8, 9, 10, 11, 12, 15), 9),
@@ -131,6 +132,7 @@ ARDUROVER = Firmware(
 
 ARDUCOPTER = Firmware(
     name="ArduPilot Copter",
+    version=0x040506FF,
     type=2,
     autopilot=ARDUPILOT,
     base_modes=dict.fromkeys((0, 1, 2, 9, 11, 13, 14, 15, 18, 20, 22, 24, 25, 28), 81)
@@ -170,6 +172,7 @@ ARDUCOPTER = Firmware(
 
 PX4_QUAD = Firmware(
     name="PX4 quad",
+    version=0x01110040,
     type=2,
     autopilot=PX4,
     base_modes=dict.fromkeys((px4_mode(main) for main in (1, 2, 3, 5, 7)), 81)

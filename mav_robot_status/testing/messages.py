@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from .definitions import (
     Attitude,
+    AutopilotVersion,
     AvailableModes,
     CurrentMode,
     EkfStatusReport,
@@ -165,6 +166,11 @@ def available_modes(firmware: Firmware, index: int) -> list[NamedTuple]:
         for i, mode in enumerate(firmware.modes, 1)
         if index in (0, i)
     ]
+
+
+def autopilot_version(firmware: Firmware) -> NamedTuple:
+    """AUTOPILOT_VERSION."""
+    return AutopilotVersion._make((0, 0, firmware.version, *(0,) * 5, *(b"",) * 4))
 
 
 def statustexts(firmware: Firmware, text: Text, number: int) -> list[NamedTuple]:

@@ -59,6 +59,8 @@ class VehicleStatus(NamedTuple):
     inhibits: tuple[str, ...]
     wanted: tuple[Wanted, ...]
     """The messages that the status of this vehicle needs."""
+    firmware: str | None = None
+    """The version of its firmware."""
 
 
 class Speaker(NamedTuple):

@@ -175,4 +175,5 @@ def _status(hw: MavlinkRobotHW, tracked: TrackedVehicle, now: Instant) -> Vehicl
         tuple(error["name"] for error in explained["errors"]),
         tuple(inhibit["name"] for inhibit in explained["inhibits"]),
         wanted,
+        explained["vehicle"].get("firmware"),
     )

@@ -92,8 +92,8 @@ def _traffic(f: Findings) -> Iterator[str]:
 def _vehicle(s: Speaker) -> Iterator[str]:
     if s.status is None:
         return
-    kind = named(mav.AUTOPILOT_NAMES, s.autopilot or 0), named(mav.TYPE_NAMES, s.type or 0)
-    yield f"vehicle {s.ids}: {', '.join(kind)}, flight mode {s.status.flight_mode or 'unknown'}"
+    kind = named(mav.AUTOPILOT_NAMES, s.autopilot or 0), s.status.firmware, named(mav.TYPE_NAMES, s.type or 0)
+    yield f"vehicle {s.ids}: {', '.join(filter(None, kind))}, flight mode {s.status.flight_mode or 'unknown'}"
     yield "rates: " + ", ".join(
         f"{name} {'once' if hz is None else f'{hz:g} Hz'}" for name, hz in s.wanted.items() if hz != 0
     )
@@ -124,6 +124,7 @@ def _speaker(s: Speaker) -> dict[str, Any]:
         "status": s.status
         and {
             "flight_mode": s.status.flight_mode,
+            **({} if s.status.firmware is None else {"firmware": s.status.firmware}),
             **s.status.fields,
             "errors": s.status.errors,
             "inhibits": s.status.inhibits,

@@ -102,4 +102,8 @@ def _lost(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opti
 def _vehicle(facts: Facts) -> Vehicle:
     """The part of the detail that stays valid while the link is lost."""
     kind = facts.kind
-    return Vehicle(autopilot=named(AUTOPILOT_NAMES, kind.autopilot), type=named(TYPE_NAMES, kind.vehicle_type))
+    return Vehicle(
+        autopilot=named(AUTOPILOT_NAMES, kind.autopilot),
+        type=named(TYPE_NAMES, kind.vehicle_type),
+        firmware=None if kind.firmware is None else str(kind.firmware),
+    )

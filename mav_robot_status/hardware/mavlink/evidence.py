@@ -92,8 +92,8 @@ def _sensor(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
 
 
 def _version(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
-    version = facts.kind.version
-    return None if version is None else f"AUTOPILOT_VERSION {version[0]}.{version[1]}", None
+    told = state.firmware
+    return (None, None) if told is None else (told.source, told.at)
 
 
 def _switches(state: VehicleState, facts: Facts, reason: Reason) -> Shown:

@@ -14,8 +14,8 @@ from ...mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
 if TYPE_CHECKING:
     from ...mavlink.definitions import Heartbeat
     from .autopilots import Autopilot
+    from .autopilots.firmware import Firmware
     from .autopilots.modes import ModeHints
-    from .autopilots.profile import Version
     from .identity import Family
 
 
@@ -28,8 +28,8 @@ class Kind(NamedTuple):
     """MAV_TYPE."""
     autopilot: int
     """MAV_AUTOPILOT."""
-    version: Version | None
-    """The firmware version. None: unknown, or a build without a tag."""
+    firmware: Firmware | None
+    """The version of the firmware. None: not reported since its boot, or a build without one."""
 
 
 class Fresh(NamedTuple):

@@ -56,7 +56,8 @@ NO_HINTS: Final = ModeHints()
 
 def kind(state: VehicleState, moment: Moment, options: HardwareOptions) -> Kind:
     """The kind of vehicle."""
-    return Kind(state.profile, state.family, state.vehicle_type, state.autopilot, state.version)
+    told = state.firmware
+    return Kind(state.profile, state.family, state.vehicle_type, state.autopilot, told and told.firmware)
 
 
 def heartbeat(state: VehicleState, moment: Moment, options: HardwareOptions) -> Heartbeat:

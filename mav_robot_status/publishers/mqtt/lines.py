@@ -75,8 +75,8 @@ def event_of(
 def members_of(msg: RobotStatusMsg) -> dict[str, Any]:
     """The members that can change. Those of `vehicle` and `link` have names like `vehicle.flight_mode`."""
     line = json.loads("{" + native_body(msg.handle, msg.status, msg.detail) + "}}")
-    groups = {name: line.pop(name) for name in ("vehicle", "link")}
-    for name in ("handle", "system", "component"):
+    groups = {"vehicle": msg.detail.vehicle._asdict(), "link": line.pop("link")}
+    for name in ("handle", "system", "component", "vehicle"):
         del line[name]
     return {
         **line,

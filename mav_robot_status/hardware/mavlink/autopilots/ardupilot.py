@@ -221,6 +221,16 @@ TEXTS: Final = table(
     ]
 )
 
+FIRMWARE: Final = {
+    "ArduCopter": Family.COPTER,
+    "ArduPlane": Family.PLANE,
+    "ArduRover": Family.ROVER,
+    "APMrover2": Family.ROVER,  # to 3.5
+    "ArduSub": Family.SUB,
+    "AntennaTracker": Family.TRACKER,
+    "Blimp": Family.BLIMP,
+}
+
 WEIGHTS: Final = sensor_weights.without(
     # ArduPlane reports terrain as unhealthy during every good flight; a relevant loss of terrain data has a text
     sensor_weights.COMMON | sensor_weights.CONTROL,
@@ -248,7 +258,9 @@ ARDUPILOT: Final = Autopilot(
         initialising=dict.fromkeys((Family.PLANE, Family.ROVER, Family.TRACKER), INITIALIZING),
     ),
     states=States(uninit=Uninit.STARTING, standby_is_landed=True),
-    texts=Texts(rules=TEXTS, stop_text=StopText.READINESS, safety_switch=frozenset(), sends_events=False),
+    texts=Texts(
+        rules=TEXTS, stop_text=StopText.READINESS, safety_switch=frozenset(), sends_events=False, firmware=FIRMWARE
+    ),
     sensors=Sensors(
         weights=WEIGHTS,
         are_monitored=True,
@@ -280,7 +292,7 @@ ARDUPILOT: Final = Autopilot(
     requests=Requests(
         wanted=wanted.COMMON + wanted.ESTIMATOR,
         watched_families=frozenset({Family.COPTER, Family.ROVER, Family.PLANE, Family.SUB}),
-        lists_modes=False,
+        once=(wanted.VERSION,),
         streams=STREAMS,
     ),
 )

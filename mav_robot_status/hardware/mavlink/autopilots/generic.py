@@ -32,7 +32,7 @@ GENERIC: Final = Autopilot(
     recognition=Recognition(autopilots=frozenset(), lacks=None),
     modes=Modes(flight_mode=standard, overrides_key=None, initialising={}),
     states=States(uninit=Uninit.STARTING, standby_is_landed=False),
-    texts=Texts(rules=(), stop_text=StopText.STATE, safety_switch=frozenset(), sends_events=False),
+    texts=Texts(rules=(), stop_text=StopText.STATE, safety_switch=frozenset(), sends_events=False, firmware={}),
     sensors=Sensors(
         weights=sensor_weights.COMMON,
         are_monitored=True,
@@ -56,5 +56,7 @@ GENERIC: Final = Autopilot(
         needs_healthy_estimator=False,
         reports_estimator=False,
     ),
-    requests=Requests(wanted=wanted.COMMON, watched_families=frozenset(), lists_modes=True, streams={}),
+    requests=Requests(
+        wanted=wanted.COMMON, watched_families=frozenset(), once=(wanted.VERSION, wanted.MODES), streams={}
+    ),
 )

@@ -73,5 +73,5 @@ PAPARAZZI: Final[Autopilot] = replace(
         needs_healthy_estimator=False,
         reports_estimator=False,
     ),
-    requests=Requests(wanted=(), watched_families=frozenset(), lists_modes=False, streams={}),
+    requests=Requests(wanted=(), watched_families=frozenset(), once=(), streams={}),
 )

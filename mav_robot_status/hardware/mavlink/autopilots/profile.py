@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .modes import FlightMode, ModeHints
     from .sensor_weights import Weights
     from .texts import TextRule
-    from .wanted import Wanted
+    from .wanted import Once, Wanted
 
 Version = tuple[int, int]
 """Major, minor of the firmware."""
@@ -102,6 +102,8 @@ class Texts:
     """The texts that give the safety switch as the reason not to arm."""
     sends_events: bool
     """Whether the levels of an EVENT have the meaning of STATUSTEXT severities."""
+    firmware: Mapping[str, Family]
+    """The names of the firmware in the text of its boot, which gives its version, each with its kind of vehicle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,8 +163,8 @@ class Requests:
     """The messages that a status needs."""
     watched_families: frozenset[Family]
     """The families that also need OUTPUT_WATCH."""
-    lists_modes: bool
-    """Whether AVAILABLE_MODES is requested."""
+    once: tuple[Once, ...]
+    """The messages that are requested once: after the first heartbeat, and after a reboot."""
     streams: Mapping[int, int]
     """MAV_DATA_STREAM by message id, for firmware that does not know MAV_CMD_SET_MESSAGE_INTERVAL."""
 

@@ -147,6 +147,7 @@ PX4: Final = Autopilot(
         stop_text=StopText.STATE,
         safety_switch=frozenset({"Preflight Fail: Press safety button first"}),
         sends_events=True,
+        firmware={},
     ),
     sensors=Sensors(
         weights=WEIGHTS,
@@ -172,6 +173,9 @@ PX4: Final = Autopilot(
         reports_estimator=False,
     ),
     requests=Requests(
-        wanted=wanted.COMMON + wanted.CURRENT_MODE, watched_families=frozenset(), lists_modes=True, streams={}
+        wanted=wanted.COMMON + wanted.CURRENT_MODE,
+        watched_families=frozenset(),
+        once=(wanted.VERSION, wanted.MODES),
+        streams={},
     ),
 )

@@ -27,6 +27,20 @@ def wanted(message_id: int, rate: float, instead: int | None = None) -> Wanted:
     return Wanted(message_id, definition.name, rate, definition.size + 12, instead)
 
 
+class Once(NamedTuple):
+    """One message that is requested once: after the first heartbeat, and after a reboot."""
+
+    id: int
+    name: str
+    older: int | None = None
+    """The command, with 1 as its first parameter, for firmware that does not know MAV_CMD_REQUEST_MESSAGE."""
+
+
+VERSION: Final = Once(
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, "AUTOPILOT_VERSION", mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES
+)
+MODES: Final = Once(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, "AVAILABLE_MODES")
+
 COMMON: Final = (
     wanted(mavlink.MAVLINK_MSG_ID_SYS_STATUS, 1.0),
     wanted(mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 2.0),

@@ -111,7 +111,7 @@ def rebooted(state: VehicleState, boot: boot_rules.BootClock, now: Instant) -> N
         watch=outputs.Watch(functions=state.watch.functions),
         switches=state.switches,
         modes=state.modes,
-        version=state.version,
+        firmware=state.firmware if state.firmware is not None and state.firmware.at > boot.at else None,
         asked=state.asked,
         boots=state.boots + 1,
         formerly=state.formerly,

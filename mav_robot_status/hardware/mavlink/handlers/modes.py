@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 from ....mavlink.decode import text
 from ....mavlink.definitions import AutopilotVersion, AvailableModes, CurrentMode
+from ..autopilots import firmware
 from ..autopilots.modes import AvailableMode
 from ..state.latest_messages import heard
+from ..state.vehicle_state import ToldFirmware
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -33,7 +35,7 @@ def available_modes(state: VehicleState, message: AvailableModes, now: Instant, 
 
 
 def autopilot_version(state: VehicleState, message: AutopilotVersion, now: Instant, options: HardwareOptions) -> None:
-    """AUTOPILOT_VERSION: the version of the software, zero for a build without a tag."""
-    version = message.flight_sw_version >> 16
-    if version:
-        state.version = version >> 8, version & 0xFF
+    """AUTOPILOT_VERSION: the version of the firmware."""
+    version = firmware.of_number(message.flight_sw_version)
+    if version is not None:
+        state.firmware = ToldFirmware(version, now.mono, f"AUTOPILOT_VERSION {version}")

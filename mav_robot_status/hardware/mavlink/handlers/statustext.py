@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Final
 from ....mavlink.definitions import Event, Statustext
 from ....mavlink.enumerations import MAV_STATE_CRITICAL, MAV_STATE_FLIGHT_TERMINATION
 from .. import causes
+from ..autopilots import firmware
 from ..autopilots import texts as text_rules
 from ..autopilots.profile import StopText
 from ..autopilots.texts import UNCLASSIFIED, Effect, When, classify
 from ..state import estop, latches, text_assembly
-from ..state.vehicle_state import Statement
+from ..state.vehicle_state import Statement, ToldFirmware
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -43,6 +44,10 @@ def statustext_(state: VehicleState, message: Statustext, now: Instant, options:
 def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
     """A complete text, or the part that arrived."""
     words = text.text
+    version = firmware.of_text(words, state.profile.texts.firmware, state.family)
+    if version is not None:
+        state.firmware = ToldFirmware(version, now.mono, f"STATUSTEXT: {words}")
+        return
     rule = classify(words, state.profile.texts.rules)
     if rule is None:
         if text.severity <= UNCLASSIFIED and state.heartbeats.armed and classify(words, text_rules.COMMON) is None:

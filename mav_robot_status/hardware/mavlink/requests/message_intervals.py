@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 from ....mavlink import definitions as mav
 from ....mavlink import enumerations as mavlink
 from ....mavlink.enumerations import MAV_CMD_REQUEST_MESSAGE, MAV_CMD_SET_MESSAGE_INTERVAL
-from ..autopilots.wanted import OUTPUT_WATCH, Wanted
+from ..autopilots.wanted import OUTPUT_WATCH, Once, Wanted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,12 +47,14 @@ def wanted_of(profile: Autopilot, family: Family, watch_outputs: bool) -> tuple[
 class _Command:
     """A command that waits for its acknowledgement."""
 
-    __slots__ = ("command", "due", "params", "tries", "what")
+    __slots__ = ("command", "due", "older", "params", "tries", "what")
 
-    def __init__(self, command: int, params: tuple[float, float], what: str) -> None:
+    def __init__(self, command: int, params: tuple[float, float], what: str, older: int | None = None) -> None:
         self.command = command
         self.params = params
         self.what = what
+        self.older = older
+        """The command to send if this one is not supported."""
         self.tries = 0
         self.due = -math.inf
 
@@ -69,7 +71,7 @@ class Requests:
         """Messages that did not arrive at all during a round."""
         self._streams: deque[tuple[int, int]] = deque()
         """Message id and rate in Hz of the streams to request."""
-        self._asked_modes = False
+        self._asked_once = False
         self._round = 0
         self._window = started
         self._look_at = started + LOOK
@@ -80,7 +82,7 @@ class Requests:
         self._queue.clear()
         self._refused.clear()
         self._streams.clear()
-        self._asked_modes = False
+        self._asked_once = False
         self._round, self._window, self._look_at = 0, now, now + LOOK
 
     def resume(self, now: float) -> None:
@@ -108,9 +110,13 @@ class Requests:
         else:
             self._queue.popleft()
             if ack.result not in (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED):
-                self._refused.add(int(command.params[0]))
-                if ack.result == mavlink.MAV_RESULT_UNSUPPORTED and command.command == MAV_CMD_SET_MESSAGE_INTERVAL:
-                    self._fall_back(*command.params)
+                unsupported = ack.result == mavlink.MAV_RESULT_UNSUPPORTED
+                if command.command == MAV_CMD_SET_MESSAGE_INTERVAL:
+                    self._refused.add(int(command.params[0]))
+                    if unsupported:
+                        self._fall_back(*command.params)
+                elif unsupported and command.older is not None:
+                    self._queue.appendleft(_Command(command.older, (1.0, 0.0), command.what))
                 log.debug("%d.%d refused %s: MAV_RESULT %d", *self._ids, command.what, ack.result)
 
     def due(
@@ -118,7 +124,7 @@ class Requests:
     ) -> mav.CommandLong | mav.RequestDataStream | None:
         """The command to send at `now`, if any; one is outstanding at a time."""
         if now >= self._look_at:
-            self._look(now, wanted, profile.requests.lists_modes)
+            self._look(now, wanted, profile.requests.once)
         while self._streams:
             message_id, rate = self._streams.popleft()
             stream = profile.requests.streams.get(message_id)
@@ -145,7 +151,7 @@ class Requests:
             return -math.inf
         return min(self._look_at, self._queue[0].due if self._queue else math.inf)
 
-    def _look(self, now: float, wanted: tuple[Wanted, ...], ask_modes: bool) -> None:
+    def _look(self, now: float, wanted: tuple[Wanted, ...], once: tuple[Once, ...]) -> None:
         """Compare the received messages with the wanted ones, and queue requests for the missing ones."""
         missing = [w for w in self._missing(wanted) if w.id not in self._refused]
         self._round += 1
@@ -157,11 +163,9 @@ class Requests:
             return
         for w in missing:
             self._queue.append(_Command(MAV_CMD_SET_MESSAGE_INTERVAL, (w.id, round(1e6 / w.rate)), w.name))
-        if ask_modes and not self._asked_modes:
-            self._asked_modes = True
-            self._queue.append(
-                _Command(MAV_CMD_REQUEST_MESSAGE, (mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, 0.0), "AVAILABLE_MODES")
-            )
+        if not self._asked_once:
+            self._asked_once = True
+            self._queue.extend(_Command(MAV_CMD_REQUEST_MESSAGE, (o.id, 0.0), o.name, o.older) for o in once)
         if missing:
             log.info("requesting from vehicle %d.%d: %s", *self._ids, ", ".join(w.name for w in missing))
         self._silent = {w.id for w in wanted if not self._came(w)}

@@ -38,7 +38,7 @@ def _by_state(facts: Facts, options: HardwareOptions) -> Finding:
         if is_simulated(facts):
             return UNKNOWN, Reason("in hardware-in-the-loop older PX4 is always in lockdown", Source.STATE)
         return TRUE, Reason("state FLIGHT_TERMINATION: kill, lockdown or termination", Source.STATE)
-    said, version, shown_from = facts.stop.said, facts.kind.version, facts.kind.profile.stops.shown_from
+    said, version, shown_from = facts.stop.said, facts.kind.firmware, facts.kind.profile.stops.shown_from
     if said is TRUE:
         return TRUE, SAID
     if version is None or shown_from is None or version >= shown_from:

@@ -25,7 +25,7 @@ class Source(Enum):
     PREARM_CHECK = "PREARM_CHECK in SYS_STATUS"
     INTERNAL_ERRORS = "errors_count in SYS_STATUS"
     SENSOR = "a bit in SYS_STATUS"
-    VERSION = "AUTOPILOT_VERSION"
+    VERSION = "the version of the firmware"
     SWITCHES = "RCn_OPTION"
     STOP = "what was said of an emergency stop"
     LATCH = "what announced a cause"

@@ -24,6 +24,7 @@ from .pending_command import PendingCommand
 if TYPE_CHECKING:
     from ....mavlink.definitions import Heartbeat
     from ..autopilots import Autopilot
+    from ..autopilots.firmware import Firmware
     from ..autopilots.modes import AvailableMode
 
 
@@ -33,6 +34,15 @@ class Statement(NamedTuple):
     text: str
     since: Instant
     last: float
+
+
+class ToldFirmware(NamedTuple):
+    """A version, and when and in which message the autopilot reported it."""
+
+    firmware: Firmware
+    at: float
+    """Monotonic seconds."""
+    source: str
 
 
 @dataclass(slots=True)
@@ -63,8 +73,8 @@ class VehicleState:
     """RCn_OPTION by channel, as far as received."""
     texts: text_assembly.TextAssembly = text_assembly.EMPTY
     modes: Mapping[int, AvailableMode] = field(default_factory=dict)
-    version: tuple[int, int] | None = None
-    """The version of the autopilot's software, if received: major, minor."""
+    firmware: ToldFirmware | None = None
+    """The version of the autopilot's firmware, if it reported it since its boot."""
     not_ready: Statement | None = None
     """The reason why it cannot be armed."""
     failsafe: Statement | None = None

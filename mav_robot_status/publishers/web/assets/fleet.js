@@ -12,10 +12,11 @@ export function title(line) {
   return line.system === null || line.system === undefined ? handle : `System ${line.system}`;
 }
 
-/** Ids, autopilot and type in one line. */
+/** Ids, autopilot with its firmware, and type in one line. */
 export function kind(line) {
   const ids = line.system === null || line.system === undefined ? null : `${line.system}.${line.component}`;
-  return [ids, line.vehicle?.autopilot, line.vehicle?.type].filter((part) => part).join(" · ");
+  const autopilot = [line.vehicle?.autopilot, line.vehicle?.firmware].filter((part) => part).join(" ");
+  return [ids, autopilot, line.vehicle?.type].filter((part) => part).join(" · ");
 }
 
 /** Errors and reasons why motion is not possible, as list items. */

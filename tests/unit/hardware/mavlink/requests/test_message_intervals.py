@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import pytest
 
@@ -10,18 +11,22 @@ from mav_robot_status.hardware.mavlink.identity import Family
 from mav_robot_status.hardware.mavlink.requests.message_intervals import BUDGET, Requests, wanted_of
 from mav_robot_status.mavlink.definitions import CommandAck, CommandLong, RequestDataStream
 from mav_robot_status.mavlink.enumerations import (
+    MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
     MAV_CMD_REQUEST_MESSAGE,
     MAV_CMD_SET_MESSAGE_INTERVAL,
     MAV_RESULT_ACCEPTED,
     MAV_RESULT_IN_PROGRESS,
     MAV_RESULT_TEMPORARILY_REJECTED,
     MAV_RESULT_UNSUPPORTED,
+    MAVLINK_MSG_ID_AUTOPILOT_VERSION,
     MAVLINK_MSG_ID_AVAILABLE_MODES,
 )
 
 US = (1, 192)
 FAILED = 4
 ONE = (Wanted(1, "SYS_STATUS", 1.0, 55),)
+ONLY_RATES = replace(ARDUPILOT, requests=replace(ARDUPILOT.requests, once=()))
+"""An ArduPilot of which nothing is requested once."""
 TWO = (*ONE, Wanted(33, "GLOBAL_POSITION_INT", 4.0, 40, instead=32))
 
 
@@ -32,7 +37,7 @@ def ack(
 
 
 def asked(requests: Requests, now: float, wanted: tuple[Wanted, ...] = ONE, modes: bool = False) -> CommandLong | None:
-    command = requests.due(now, wanted, PX4 if modes else ARDUPILOT)
+    command = requests.due(now, wanted, PX4 if modes else ONLY_RATES)
     assert not isinstance(command, RequestDataStream)
     return command
 
@@ -139,8 +144,8 @@ def refused(requests: Requests, result: int, profile: Autopilot, wanted: tuple[W
 
 def test_an_old_ardupilot_without_the_command_gets_a_stream_request(requests: Requests) -> None:
     four_hz = (Wanted(30, "ATTITUDE", 4.0, 40),)
-    assert refused(requests, MAV_RESULT_UNSUPPORTED, ARDUPILOT, four_hz) == RequestDataStream(4, 1, 1, 10, 1)
-    assert requests.due(103.2, four_hz, ARDUPILOT) is None
+    assert refused(requests, MAV_RESULT_UNSUPPORTED, ONLY_RATES, four_hz) == RequestDataStream(4, 1, 1, 10, 1)
+    assert requests.due(103.2, four_hz, ONLY_RATES) is None
     assert requests.next_due() == 133.0
 
 
@@ -148,7 +153,7 @@ def test_the_rate_of_an_active_stream_is_not_changed() -> None:
     requests = Requests(1, 1, 100.0)
     requests.arrived(30, 101.0)
     four_hz = (Wanted(30, "ATTITUDE", 4.0, 40),)
-    assert refused(requests, MAV_RESULT_UNSUPPORTED, ARDUPILOT, four_hz) is None
+    assert refused(requests, MAV_RESULT_UNSUPPORTED, ONLY_RATES, four_hz) is None
 
 
 @pytest.mark.parametrize(("result", "profile"), [(FAILED, ARDUPILOT), (MAV_RESULT_UNSUPPORTED, PX4)])
@@ -203,12 +208,28 @@ def test_a_flapping_link_does_not_cause_more_requests(requests: Requests) -> Non
     assert [answered(requests, float(t)) for t in (173, 200, 400)] == [[], [], []]
 
 
-def test_the_modes_are_requested_once(requests: Requests) -> None:
+def test_version_and_modes_are_requested_once(requests: Requests) -> None:
     first = asked(requests, 103.0, (), True)
     assert first is not None
-    assert (first.command, first.param1) == (MAV_CMD_REQUEST_MESSAGE, MAVLINK_MSG_ID_AVAILABLE_MODES)
+    assert (first.command, first.param1) == (MAV_CMD_REQUEST_MESSAGE, MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    requests.acknowledged(ack(command=MAV_CMD_REQUEST_MESSAGE), US, 103.1)
+    second = asked(requests, 103.1, (), True)
+    assert second is not None
+    assert (second.command, second.param1) == (MAV_CMD_REQUEST_MESSAGE, MAVLINK_MSG_ID_AVAILABLE_MODES)
     requests.acknowledged(ack(command=MAV_CMD_REQUEST_MESSAGE), US, 103.1)
     assert answered(requests, 133.0, (), True) == []
+    requests.restart(200.0)
+    assert answered(requests, 203.0, (), True) == [MAVLINK_MSG_ID_AUTOPILOT_VERSION, MAVLINK_MSG_ID_AVAILABLE_MODES]
+
+
+def test_old_firmware_gets_the_old_command_for_its_version(requests: Requests) -> None:
+    assert requests.due(103.0, (), ARDUPILOT) is not None
+    requests.acknowledged(ack(MAV_RESULT_UNSUPPORTED, MAV_CMD_REQUEST_MESSAGE), US, 103.1)
+    older = requests.due(103.1, (), ARDUPILOT)
+    assert isinstance(older, CommandLong)
+    assert (older.command, older.param1) == (MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 1.0)
+    requests.acknowledged(ack(MAV_RESULT_UNSUPPORTED, MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES), US, 103.2)
+    assert requests.due(103.2, (), ARDUPILOT) is None
 
 
 @pytest.mark.parametrize("profile", AUTOPILOTS, ids=lambda profile: str(profile.name))

@@ -206,6 +206,14 @@ class ExtendedSysState(NamedTuple):
     landed_state: int
 
 
+class NamedValueFloat(NamedTuple):
+    """NAMED_VALUE_FLOAT, id 251; the known fields in wire order, arrays as raw bytes."""
+
+    time_boot_ms: int
+    value: float
+    name: bytes
+
+
 class NamedValueInt(NamedTuple):
     """NAMED_VALUE_INT, id 252; the known fields in wire order, arrays as raw bytes."""
 
@@ -355,6 +363,7 @@ MESSAGES: Final[dict[int, Definition]] = {
     148: Definition(148, "AUTOPILOT_VERSION", 78, Struct("<16xI"), AutopilotVersion),
     244: Definition(244, "MESSAGE_INTERVAL", 6, Struct("<iH"), MessageInterval),
     245: Definition(245, "EXTENDED_SYS_STATE", 2, Struct("<BB"), ExtendedSysState),
+    251: Definition(251, "NAMED_VALUE_FLOAT", 18, Struct("<If10s"), NamedValueFloat),
     252: Definition(252, "NAMED_VALUE_INT", 18, Struct("<Ii10s"), NamedValueInt),
     253: Definition(253, "STATUSTEXT", 54, Struct("<B50sHB"), Statustext),
     291: Definition(291, "ESC_STATUS", 57, Struct("<Q16s16s16sB"), EscStatus),

@@ -16,7 +16,7 @@ Scenarios are data: `scenarios` has ready ones; build others with `step` and `Sc
 from .codec import decode
 from .fake_autopilot import FakeAutopilot
 from .manual_clock import ManualClock
-from .scenario import Action, Scenario, Step, Text, VehicleState, step
+from .scenario import Action, Scenario, Step, Text, VehicleState, step, with_applet
 from .scenarios import (
     BY_NAME,
     DEMO,
@@ -58,4 +58,5 @@ __all__ = [
     "quadplane",
     "step",
     "tracker",
+    "with_applet",
 ]

@@ -27,7 +27,10 @@ from .vehicle_model import VehicleModel
 CUSTOM_MODE_ENABLED = 1
 FORCED = 21196
 GCS = 6
-SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, ARM_DISARM, DO_SET_MODE, SET_MODE = 511, 512, 400, 176, 11
+SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, ARM_DISARM, DO_SET_MODE, SET_MODE, DO_AUX_FUNCTION = 511, 512, 400, 176, 11, 218
+MOTOR_ESTOP = 31
+"""The auxiliary function of ArduPilot that stops all motors."""
+LOW, HIGH = 0, 2
 AUTOPILOT_VERSION, AVAILABLE_MODES = 148, 435
 STREAM_GROUPS = {2: (1,), 3: (36,), 6: (33, 32), 10: (30,), 11: (74,), 12: (2,)}
 """ArduPilot's stream groups: the message ids that REQUEST_DATA_STREAM starts. Group 0 means all groups."""
@@ -94,6 +97,14 @@ def _arm_disarm(model: VehicleModel, m: DecodedMessage) -> int:
     return ACCEPTED
 
 
+def _do_aux_function(model: VehicleModel, m: DecodedMessage) -> int:
+    if model.firmware.autopilot != ARDUPILOT or m.param1 != MOTOR_ESTOP:
+        return UNSUPPORTED
+    if m.param2 in (LOW, HIGH):
+        model.do(step(0.0, "", emergency_stop=m.param2 == HIGH))
+    return ACCEPTED
+
+
 def _do_set_mode(model: VehicleModel, m: DecodedMessage) -> int:
     if not all(map(math.isfinite, (m.param1, m.param2, m.param3))):
         return DENIED
@@ -138,6 +149,7 @@ COMMANDS: dict[int, Callable[[VehicleModel, DecodedMessage], int]] = {
     SET_MESSAGE_INTERVAL: _set_message_interval,
     REQUEST_MESSAGE: _request_message,
     ARM_DISARM: _arm_disarm,
+    DO_AUX_FUNCTION: _do_aux_function,
     DO_SET_MODE: _do_set_mode,
 }
 ANSWERS: dict[str, Callable[[VehicleModel, DecodedMessage], None]] = {

@@ -16,6 +16,7 @@ from .definitions import (
     GlobalPositionInt,
     Heartbeat,
     LocalPositionNed,
+    NamedValueFloat,
     ServoOutputRaw,
     Statustext,
     SysStatus,
@@ -125,6 +126,16 @@ def _current_mode(s: Snapshot) -> NamedTuple:
 def _ekf_status_report(s: Snapshot) -> NamedTuple:
     flags = ESTIMATED if s.state.position else UNAIDED
     return EkfStatusReport(0.1, 0.1, 0.1, 0.1, 0.0, flags=flags, airspeed_variance=0.0)
+
+
+def applet_value(state: VehicleState) -> int:
+    """The value of RS_STOP: 1 for the emergency stop and 2 for the safety switch."""
+    return state.emergency_stop + 2 * state.safety_switch
+
+
+def applet_report(s: Snapshot) -> NamedTuple:
+    """NAMED_VALUE_FLOAT RS_STOP, as the applet sends it."""
+    return NamedValueFloat(s.boot_ms, applet_value(s.state), b"RS_STOP")
 
 
 BUILDERS: dict[int, Callable[[Snapshot], NamedTuple]] = {

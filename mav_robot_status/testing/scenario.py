@@ -50,6 +50,8 @@ class VehicleState(NamedTuple):
     """SERVO_OUTPUT_RAW in microseconds; None: computed from throttle, armed and emergency_stop."""
     position: bool = True
     """False: no GPS fix yet, so that latitude and longitude are 0."""
+    applet: bool = False
+    """ArduPilot's applet runs, which reports emergency_stop and safety_switch as NAMED_VALUE_FLOAT RS_STOP."""
     base_mode: int | None = None
     system_status: int | None = None
     """HEARTBEAT fields; None: computed by the firmware."""
@@ -111,6 +113,11 @@ def step(at: float, note: str, *texts: tuple[int, str], action: Action | None = 
     """
     VehicleState()._replace(**changes)
     return Step(at, note, changes, tuple(Text(*text) for text in texts), action)
+
+
+def with_applet(scenario: Scenario) -> Scenario:
+    """The same scenario of an ArduPilot on which the applet runs."""
+    return scenario._replace(title=f"with the applet: {scenario.title}", start=scenario.start._replace(applet=True))
 
 
 def shifted(seconds: float, steps: tuple[Step, ...]) -> tuple[Step, ...]:

@@ -8,13 +8,15 @@ from typing import NamedTuple
 from ..clock import Instant
 from .codec import encode
 from .firmware import ARDUPILOT, PX4, not_armable
-from .messages import BUILDERS, HEARTBEAT, SYS_STATUS, Snapshot, heartbeat, statustexts
+from .messages import BUILDERS, HEARTBEAT, SYS_STATUS, Snapshot, applet_report, applet_value, heartbeat, statustexts
 from .scenario import Action, Scenario, Step, Text
 
 REBOOT_GAP = 1.2
 """Seconds from the command to the first HEARTBEAT of the new boot, as recorded."""
 PREARM_TICK = -1
 """An entry among the streams: the pre-arm checks run once a second."""
+APPLET_TICK = -2
+"""An entry among the streams: the applet repeats its report once a second."""
 PREARM_REPEAT = 30.0
 """Seconds after which ArduPilot repeats why it cannot arm."""
 SAME_TIME = 1e-6
@@ -76,7 +78,7 @@ class VehicleModel:
         self.peer_seen = self.gcs_seen = False
         self._prearm_ok = not not_armable(self.state)
         self._prearm_said = at
-        self._intervals = {HEARTBEAT: 1.0, PREARM_TICK: 1.0}
+        self._intervals = {HEARTBEAT: 1.0, PREARM_TICK: 1.0, APPLET_TICK: 1.0}
         self._intervals |= {message: 1 / hz for message, hz in self.default_streams.items()}
         self._due = {message: at + interval for message, interval in self._intervals.items()}
         self._due[HEARTBEAT] = at
@@ -127,6 +129,8 @@ class VehicleModel:
         self._due[message_id] += self._intervals[message_id]
         if message_id == PREARM_TICK:
             self._check_prearm()
+        elif message_id == APPLET_TICK:
+            self._report_stop()
         elif self.state.initialised or message_id != SYS_STATUS:
             self.send(BUILDERS[message_id](self.snapshot()))
 
@@ -139,6 +143,17 @@ class VehicleModel:
         if before or self._now - self._prearm_said >= PREARM_REPEAT:
             self._prearm_said = self._now
             self.say(Text(2, self.firmware.prearm_prefix + reason))
+
+    def _report_stop(self) -> None:
+        """The applet reports to a peer, as texts do: at once on a change, and a second after its last report."""
+        if self.state.applet and self._heard:
+            self.send(applet_report(self.snapshot()))
+            self._due[APPLET_TICK] = self._now + self._intervals[APPLET_TICK]
+
+    @property
+    def _heard(self) -> bool:
+        """Whether the link is active for ArduPilot: it has received a message, or streams run."""
+        return self.peer_seen or max(self._intervals) > HEARTBEAT
 
     def snapshot(self) -> Snapshot:
         """The inputs of a message, at the current time."""
@@ -154,9 +169,8 @@ class VehicleModel:
         self._seq = (self._seq + 1) % 256
 
     def say(self, text: Text) -> None:
-        """Send a STATUSTEXT: PX4 only to a ground station, others after a received message or while streams run."""
-        streaming = len(self._intervals) > 2
-        if self.gcs_seen if self.firmware.autopilot == PX4 else self.peer_seen or streaming:
+        """Send a STATUSTEXT: PX4 only to a ground station, others on an active link."""
+        if self.gcs_seen if self.firmware.autopilot == PX4 else self._heard:
             self._texts = self._texts % 0xFFFF + 1
             for message in statustexts(self.firmware, text, self._texts):
                 self.send(message)
@@ -169,6 +183,8 @@ class VehicleModel:
         # ArduPilot reports a mode change at once, arming with the next regular HEARTBEAT; PX4 reports both with it.
         if self.state.custom_mode != before.custom_mode and self.firmware.autopilot == ARDUPILOT:
             self.send(heartbeat(self.snapshot()))
+        if applet_value(self.state) != applet_value(before):
+            self._report_stop()
         for step_text in step.texts:
             self.say(step_text)
         text = self.firmware.armed_text if self.state.armed else self.firmware.disarmed_text
@@ -181,7 +197,8 @@ class VehicleModel:
         if action in (Action.SILENCE, Action.RESUME):
             self.silent = action is Action.SILENCE
         elif action is Action.REBOOT:
-            self.state = self.firmware.booting
+            self.do(Step(0.0, "", {"safety_switch": True}))  # as ArduPilot does before it goes; the applet reports it
+            self.state = self.firmware.booting._replace(applet=self.state.applet)
             self._boot(self._now + REBOOT_GAP)
             self._plan(self.boot, self.firmware.boot)
         elif self._loop:

@@ -83,6 +83,12 @@ RC_ESTOP = _scenario(
     step(15.0, "lying still, it disarms", armed=False, **_LANDED),
     step(19.0, "released", (6, "RC7: MotorEStop LOW"), emergency_stop=False),
 )
+RC_ESTOP_BARE = RC_ESTOP._replace(
+    title="motor emergency stop by an RC switch in flight, in the words of 4.2, which do not name the channel",
+    steps=tuple(
+        s._replace(texts=tuple(t._replace(text=t.text.removeprefix("RC7: ")) for t in s.texts)) for s in RC_ESTOP.steps
+    ),
+)
 CRASH = _scenario(
     "the copter tips over",
     *_TAKE_OFF,

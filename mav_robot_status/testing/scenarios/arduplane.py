@@ -90,6 +90,13 @@ CRASH = _scenario(
     step(26.0, "the pilot chooses FBWA: STANDBY", custom_mode=5, system_status=None),
     step(30.0, "armed again", armed=True),
 )
+ESTOP = _scenario(
+    "motor emergency stop in flight, released: nothing but the motor output shows it",
+    *_TAKE_OFF,
+    step(14.0, "stopped: the autopilot demands full throttle", emergency_stop=True, throttle=100),
+    step(16.0, "it glides down", velocity=(14.0, 0.0, 4.0)),
+    step(24.0, "released: the motor runs again", emergency_stop=False, velocity=(18.0, 0.0, -2.0)),
+)
 TERMINATION = _scenario(
     "the advanced failsafe ends the flight at a ground station's command, until a reboot",
     *_TAKE_OFF,

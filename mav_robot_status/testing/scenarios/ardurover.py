@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..firmwares import ARDUROVER
-from ..scenario import RC_RECEIVER, Action, Scenario, Step, step
+from ..scenario import RC_RECEIVER, Action, Scenario, Step, step, with_applet
 
 _HEALTH = ARDUROVER.ready.sensors_health
 _STOPPED = (0.0, 0.0, 0.0)
@@ -88,6 +88,7 @@ RC_ESTOP = _scenario(
         throttle=40,
     ),
 )
+APPLET_ESTOP = with_applet(RC_ESTOP)
 CRASH = _scenario(
     "the rover runs into something",
     *_ARM_AND_DRIVE,

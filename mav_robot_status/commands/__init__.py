@@ -23,6 +23,7 @@ COMMANDS: Final = {
     "demo": "run a fake autopilot and the gateway in one process; about 30 s",
     "check-config": "explain a configuration, or show where its error is",
     "dialect": "write the dialect's XML, and a Lua dissector for Wireshark",
+    "applet": "write the Lua script with which an ArduPilot reports its emergency stop",
 }
 """Every command with its help line, in the order of the help."""
 

@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 from typing import Final
 
+from ..data_files import data_file
 from ..errors import LinkError
 
 NAME: Final = "mav_robot_status"
@@ -41,27 +42,21 @@ end)
 """Lua: the generated dissector registers three UDP ports; a vehicle or an `--out` may use any port."""
 
 
-def xml_path() -> Path:
-    """The path of our XML: in the installed package, or in `dialects/` of a checkout."""
-    package = Path(__file__).resolve().parents[1]
-    installed = package / "data" / f"{NAME}.xml"
-    return installed if installed.exists() else package.parent / "dialects" / f"{NAME}.xml"
-
-
 def write_files(folder: str) -> list[Path]:
     """Write our XML and the Lua dissector into `folder`. Raises LinkError if that fails."""
     from pymavlink import dialects
     from pymavlink.generator import mavgen
 
     public = Path(dialects.__file__ or "").parent / "v20"
+    xml = data_file(f"{NAME}.xml", "dialects")
     target = Path(folder)
     try:
         target.mkdir(parents=True, exist_ok=True)
-        written = [Path(shutil.copyfile(xml_path(), target / f"{NAME}.xml"))]
+        written = [Path(shutil.copyfile(xml, target / f"{NAME}.xml"))]
         with tempfile.TemporaryDirectory() as work, contextlib.redirect_stdout(io.StringIO()):
             for name in INCLUDED:
                 shutil.copyfile(public / f"{name}.xml", Path(work) / f"{name}.xml")
-            source = Path(shutil.copyfile(xml_path(), Path(work) / f"{NAME}.xml"))
+            source = Path(shutil.copyfile(xml, Path(work) / f"{NAME}.xml"))
             options = mavgen.Opts(str(Path(work) / f"{NAME}.lua"), wire_protocol="2.0", language="WLua", validate=False)
             with contextlib.redirect_stderr(io.StringIO()):
                 mavgen.mavgen(options, [str(source)])

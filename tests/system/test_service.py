@@ -406,6 +406,8 @@ def test_the_wheel_installs_the_command_and_the_files_of_the_service(
     subprocess.run([command, *install, "--python", sys.executable, what], check=True, timeout=allow(300))
     shown = subprocess.run([tmp_path / "bin" / "mav-robot-status", "--version"], capture_output=True, text=True)
     assert shown.stdout.startswith("mav-robot-status ")
+    applet = subprocess.run([tmp_path / "bin" / "mav-robot-status", "applet"], capture_output=True, check=True)
+    assert applet.stdout == (ROOT / "contrib" / "ardupilot" / "robot_status.lua").read_bytes()
     files = {path.name for path in (tmp_path / "tools").rglob("share/mav-robot-status/**/*") if path.is_file()}
     there_are = {path.name for path in (ROOT / "contrib").rglob("*") if path.is_file()}
     assert files == there_are

@@ -10,17 +10,19 @@ import re
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...mavlink import definitions as mav
+from ...mavlink.applet import WORDS
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_ARDUPILOTMEGA, MAV_AUTOPILOT_PX4
 from .findings import HEARTBEAT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from .findings import Findings, Speaker
 
 BROKEN: Final = 50.0
 """From this percentage of lost frames on, the advice is to repair the link first."""
+APPLET_PAGE: Final = "docs/ardupilot-applet.md"
 EVERY_ADDRESS: Final = ("0.0.0.0", "::")
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 
@@ -124,10 +126,24 @@ def use_mavlink_2(vehicle: Speaker) -> str:
 
 
 def run(f: Findings) -> str:
-    """The command that publishes the statuses."""
-    return f"mav-robot-status {f.url.text}" + (" --passive" if f.passive and not f.url.kind.is_log else "")
+    """The command that publishes the statuses, and how to know more."""
+    command = f"mav-robot-status {f.url.text}" + (" --passive" if f.passive and not f.url.kind.is_log else "")
+    return command + (APPLET_ADVICE if any(s.needs_applet for s in f.vehicles) else "")
 
 
+def applet_heard(vehicle: Speaker) -> Iterator[str]:
+    """Whether the applet on an ArduPilot is heard; nothing for other autopilots."""
+    report = vehicle.applet
+    if report is not None:
+        since = "" if report.fresh else f"; silent for {report.age:.0f} s"
+        yield f"applet: RS_STOP {report.value}, {WORDS[report.value]}{since}"
+    elif vehicle.status is not None and vehicle.status.can_run_applet:
+        yield "applet: not heard" + (
+            "; without it an ArduPilot may show an emergency stop in no message" if vehicle.needs_applet else ""
+        )
+
+
+APPLET_ADVICE: Final = "; for an e_stopped that is always known, put the applet on the autopilot: " + APPLET_PAGE
 OTHER_SYSTEM: Final = (
     "give one of them another system id (ArduPilot: SYSID_THISMAV, from 4.7 on MAV_SYSID; PX4: MAV_SYS_ID)"
 )

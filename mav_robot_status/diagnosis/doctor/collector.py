@@ -9,11 +9,12 @@ from ...gateway.observer import Observer
 from ...gateway.path_selection import APART, CLOCKS
 from ...hardware.mavlink.identity import is_autopilot, named
 from ...mavlink import definitions as mav
+from ...mavlink.applet import stop_report
 from ...mavlink.counters import Counters
 from ...mavlink.counters import count as add
 from ...mavlink.framing import Parser
 from ...mavlink.wire import V1
-from .findings import HEARTBEAT, Speaker
+from .findings import HEARTBEAT, AppletReport, Speaker
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -98,10 +99,12 @@ class _Component:
     """The input from one component."""
 
     __slots__ = (
+        "_applet",
         "_boots",
         "_clock_off",
         "_kind",
         "_last",
+        "_last_frame",
         "_returns",
         "_swaps",
         "_times",
@@ -124,14 +127,22 @@ class _Component:
         self._last = -1
         self._returns = 0
         self._clock_off: float | None = None
+        self._applet: tuple[int, float] | None = None
+        """The last report of the applet, and when it came."""
+        self._last_frame = 0.0
 
     def take(self, frame: Frame, now: Instant) -> None:
         self.frames += 1
+        self._last_frame = now.mono
         self.v1 += frame.raw[0] == V1
         number, first, _ = self._times.get(frame.message_id, (0, now.mono, 0.0))
         self._times[frame.message_id] = number + 1, first, now.mono
         if frame.message_id == HEARTBEAT:
             self._note_heartbeat(frame.message, frame.ids[1])
+        elif type(frame.message) is mav.NamedValueFloat:
+            report = stop_report(frame.message)
+            if report is not None:
+                self._applet = report, now.mono
         elif frame.message_id in CLOCKS:
             message = frame.message
             self._note_boot_time(now.mono - message.time_boot_ms / 1000)
@@ -181,6 +192,7 @@ class _Component:
             pilot=bool(self.kinds),
             conflict=self._conflict(),
             clock_off=self._clock_off,
+            applet=self._applet and AppletReport(self._applet[0], self._last_frame - self._applet[1]),
             status=status,
         )
 

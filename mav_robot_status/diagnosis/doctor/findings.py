@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...hardware.mavlink.identity import named
 from ...mavlink import definitions as mav
+from ...mavlink.applet import FRESH
 from ...mavlink.counters import Counters
 
 if TYPE_CHECKING:
@@ -49,6 +50,20 @@ class Place(NamedTuple):
 NOWHERE: Final = Place()
 
 
+class AppletReport(NamedTuple):
+    """The last report of the applet on an ArduPilot."""
+
+    value: int
+    """The value of RS_STOP."""
+    age: float
+    """Seconds from it to the last frame of the vehicle."""
+
+    @property
+    def fresh(self) -> bool:
+        """Whether the applet still reports."""
+        return self.age <= FRESH
+
+
 class VehicleStatus(NamedTuple):
     """The gateway's view of a vehicle."""
 
@@ -61,6 +76,8 @@ class VehicleStatus(NamedTuple):
     """The messages that the status of this vehicle needs."""
     firmware: str | None = None
     """The version of its firmware."""
+    can_run_applet: bool = False
+    """Whether its autopilot is ArduPilot, which can run the applet."""
 
 
 class Speaker(NamedTuple):
@@ -84,6 +101,8 @@ class Speaker(NamedTuple):
     """The evidence that two components use these ids; empty if there is none."""
     clock_off: float | None = None
     """Seconds by which its clock is ahead of ours; None if it does not know the time."""
+    applet: AppletReport | None = None
+    """None if the applet was not heard."""
     status: VehicleStatus | None = None
     """None if it has no handle."""
 
@@ -110,6 +129,14 @@ class Speaker(NamedTuple):
             name = mav.MESSAGES[ids[0] if came is None else came].name
             wanted[name] = 0.0 if came is None else self.rates.get(came)
         return wanted
+
+    @property
+    def needs_applet(self) -> bool:
+        """Whether the applet is not heard, and would make a known `e_stopped` of an unknown one."""
+        status = self.status
+        if status is None or not status.can_run_applet or (self.applet is not None and self.applet.fresh):
+            return False
+        return status.fields.get("e_stopped") is None
 
     @property
     def missing(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from ...hardware.mavlink.identity import named
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_PX4
-from .advice import listed, named_all
+from .advice import applet_heard, listed, named_all
 from .findings import GROUND_STATION
 
 if TYPE_CHECKING:
@@ -100,6 +100,7 @@ def _vehicle(s: Speaker) -> Iterator[str]:
     if s.missing:
         yield f"missing: {', '.join(s.missing)}"
     yield "status: " + ", ".join(f"{name} {_word(value)}" for name, value in s.status.fields.items())
+    yield from applet_heard(s)
     for what, names in (("errors", s.status.errors), ("inhibits", s.status.inhibits)):
         if names:
             yield f"{what}: {', '.join(names)}"
@@ -130,4 +131,5 @@ def _speaker(s: Speaker) -> dict[str, Any]:
             "inhibits": s.status.inhibits,
         },
         "rates": s.wanted if s.status else {},
+        "applet": s.applet and {"value": s.applet.value, "age": round(s.applet.age, 3)},
     }

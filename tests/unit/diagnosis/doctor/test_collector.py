@@ -1,14 +1,15 @@
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.diagnosis.doctor.collector import HEAD, MOST_SOURCES, MOST_SPEAKERS, Collector
-from mav_robot_status.diagnosis.doctor.findings import Findings
+from mav_robot_status.diagnosis.doctor.findings import AppletReport, Findings
 from mav_robot_status.links.url import parse
-from mav_robot_status.mavlink.definitions import Attitude, Heartbeat, SystemTime
+from mav_robot_status.mavlink.definitions import Attitude, Heartbeat, NamedValueFloat, SystemTime
 from mav_robot_status.mavlink.encode import encode
 
 START = Instant(100.0, 1_800_000_000_000_000)
@@ -120,3 +121,30 @@ def test_a_clock_counts_only_if_its_time_is_set(ear: Ear) -> None:
     assert ear.found.speakers[0].clock_off is None
     ear.hear(SystemTime(START.unix_us + 90_000_000, 5))
     assert ear.found.speakers[0].clock_off == 90.0
+
+
+def report(value: float, name: bytes = b"RS_STOP") -> NamedValueFloat:
+    return NamedValueFloat(0, value, name)
+
+
+def test_the_last_report_of_the_applet_is_kept_with_its_age(ear: Ear) -> None:
+    for at, message in enumerate((ROVER, report(0), report(3), ROVER, ROVER)):
+        ear.hear(message, at)
+    assert ear.found.speakers[0].applet == AppletReport(3, 2.0)
+    assert ear.found.speakers[0].applet.fresh
+    ear.hear(ROVER, 5.5)
+    assert not ear.found.speakers[0].applet.fresh
+
+
+@pytest.mark.parametrize("other", [report(4), report(-1), report(0.5), report(math.nan), report(math.inf)])
+def test_a_value_that_the_applet_never_sends_is_no_report(ear: Ear, other: NamedValueFloat) -> None:
+    ear.hear(ROVER)
+    ear.hear(other)
+    assert ear.found.speakers[0].applet is None
+
+
+def test_a_value_of_another_name_is_no_report_and_a_report_is_of_its_sender(ear: Ear) -> None:
+    ear.hear(ROVER)
+    ear.hear(report(1, b"RS_STOP_2"))
+    ear.hear(report(1), component=191)
+    assert [s.applet is None for s in ear.found.speakers] == [True, False]

@@ -9,7 +9,14 @@ import pytest
 
 from mav_robot_status.diagnosis.doctor.advice import protocol
 from mav_robot_status.diagnosis.doctor.diagnosis import CASES, diagnose
-from mav_robot_status.diagnosis.doctor.findings import Findings, Place, Speaker, Trouble, VehicleStatus
+from mav_robot_status.diagnosis.doctor.findings import (
+    AppletReport,
+    Findings,
+    Place,
+    Speaker,
+    Trouble,
+    VehicleStatus,
+)
 from mav_robot_status.diagnosis.doctor.rendering import as_text, remarks
 from mav_robot_status.hardware.mavlink.autopilots.wanted import COMMON
 from mav_robot_status.links.url import parse
@@ -178,3 +185,34 @@ def test_px4_without_a_ground_station_is_reported_to_send_no_texts() -> None:
 def test_the_text_lists_only_a_few_of_many_addresses() -> None:
     f = heard(ROVER, sources=tuple(f"10.0.0.{i}:5" for i in range(9)))
     assert "from 10.0.0.0:5, 10.0.0.1:5, 10.0.0.2:5, 10.0.0.3:5, ...;" in as_text(f, diagnose(f))
+
+
+def ardupilot(e_stopped: bool | None, applet: AppletReport | None) -> Speaker:
+    fields = {**STATUS.fields, "e_stopped": e_stopped}
+    return ROVER._replace(status=STATUS._replace(fields=fields, can_run_applet=True), applet=applet)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "remark", "advised"),
+    [
+        (ardupilot(None, None), "applet: not heard; without it an ArduPilot may show an emergency stop", True),
+        (ardupilot(False, None), "applet: not heard", False),
+        (ardupilot(False, AppletReport(0, 0.4)), "applet: RS_STOP 0, no stop", False),
+        (ardupilot(True, AppletReport(3, 3.0)), "applet: RS_STOP 3, the emergency stop is engaged, the safety", False),
+        (ardupilot(None, AppletReport(1, 0.4)), "applet: RS_STOP 1, the emergency stop is engaged", False),
+        (ardupilot(None, AppletReport(2, 7.2)), "applet: RS_STOP 2, the safety switch is on; silent for 7 s", True),
+    ],
+)
+def test_the_applet_is_advised_where_it_would_make_e_stopped_known(
+    vehicle: Speaker, remark: str, advised: bool
+) -> None:
+    f = heard(vehicle)
+    assert any(line.startswith(remark) for line in remarks(f))
+    assert (diagnose(f).cause, diagnose(f).ok) == ("ok", True)
+    assert ("docs/ardupilot-applet.md" in diagnose(f).next) is advised
+    assert diagnose(f).next.startswith("mav-robot-status udp:127.0.0.1:14550")
+
+
+def test_the_applet_is_not_mentioned_for_an_autopilot_that_cannot_run_it() -> None:
+    unknown = ROVER._replace(status=STATUS._replace(fields={**STATUS.fields, "e_stopped": None}))
+    assert "applet" not in as_text(heard(unknown), diagnose(heard(unknown)))

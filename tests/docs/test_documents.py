@@ -47,7 +47,8 @@ TESTS = SETUP + "-e '.[dev]' && .venv/bin/python -m pytest"
 DEMO = SETUP + ". && .venv/bin/mav-robot-status demo"
 GENERATORS = {".venv/bin/python dialects/generate.py": ".", ".venv/bin/python docs/make_reference.py": "autopilots.md"}
 """What they write to, in the folder of the test."""
-BENCH = ".venv/bin/python -m bench"
+SCOREBOARD = ".venv/bin/python docs/make_scoreboard.py"
+MEASUREMENTS = (".venv/bin/python -m bench", SCOREBOARD)
 KEY = bytes(range(32))
 PATIENCE = 30.0  # s on an idle machine until a command counts as hanging
 
@@ -140,9 +141,9 @@ def test_a_command_does_what_it_says(block: Block, command: str, place: pathlib.
         _runs_until_stopped(place, ["mav-robot-status", "demo"], signal.SIGINT)
     elif (target := GENERATORS.get(command)) is not None:
         subprocess.run([sys.executable, ROOT / command.split()[1], place / target], check=True, timeout=allow(PATIENCE))
-    elif command.startswith(BENCH):  # measuring takes minutes: here it only lists the cases
-        bench = [sys.executable, *command.split()[1:], "--list"]
-        assert subprocess.run(bench, cwd=ROOT, capture_output=True, check=True, timeout=allow(PATIENCE)).stdout
+    elif command.startswith(MEASUREMENTS):  # they take minutes: here they only list their cases
+        measurement = [sys.executable, *command.split()[1:], "--list"]
+        assert subprocess.run(measurement, cwd=ROOT, capture_output=True, check=True, timeout=allow(PATIENCE)).stdout
     elif command.startswith(".venv/bin/"):
         assert command in _ci()
     elif command.startswith("mav-robot-status ") and re.search(r" udp:| /dev/tty| --config ", command):

@@ -9,6 +9,7 @@ from typing import Any, Final, get_type_hints
 from ..hardware.mavlink.options import BELOW
 from ..interface import DEFAULT_HANDLE_NAME
 from ..links import url
+from ..mavlink.component import GROUND_STATION
 from .document import Node, load_document, quoted
 from .model import Config, ControllerConfig, HardwareConfig, PublisherConfig, VehicleConfig
 from .values import did_you_mean, entries, read
@@ -48,6 +49,7 @@ def build(document: Node) -> Config:
     _check_hysteresis(config, given)
     _check_outs(config, given)
     _check_vehicles(config.vehicles, given)
+    _check_identity(config, given)
     _check_handles(config, given)
     return config
 
@@ -103,6 +105,14 @@ def _check_hysteresis(config: Config, given: dict[str, Node]) -> None:
             written = entries(given["hardware"])
             fault = (written.get(lower) or written[upper]).fault
             raise fault(f"{lower} ({low:g} m/s) must be less than {upper} ({high:g} m/s)")
+
+
+def _check_identity(config: Config, given: dict[str, Node]) -> None:
+    if config.identity.system == GROUND_STATION:
+        raise entries(given["identity"])["system"].fault(
+            f"our system id cannot be {GROUND_STATION}: autopilots take it for their ground station's (SYSID_MYGCS) "
+            "and would not notice its loss; write auto, or another number"
+        )
 
 
 def _check_outs(config: Config, given: dict[str, Node]) -> None:

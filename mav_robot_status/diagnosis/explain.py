@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import logging
 import re
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any, Final
@@ -27,8 +28,13 @@ if TYPE_CHECKING:
     from ..interface import HardwareInterface, IndustrialRobotStatusHandle
     from ..links.log import Stamped
 
+log = logging.getLogger(__name__)
+
 LISTEN: Final = 5.0
 """Seconds from the first heartbeat to the explanation of a live link. Slow streams arrive twice in this time."""
+ANSWERS: Final = 25.0
+"""Seconds from the first heartbeat to the explanation while answers of the autopilot are outstanding. Its parameters
+take 17 s."""
 PATIENCE: Final = 30.0  # s to wait for the first heartbeat
 
 
@@ -67,14 +73,26 @@ def explain_live(config: Config, stdout: TextIO, clock: Callable[[], Instant] = 
     gateway.stop_on_signals()
     start = clock().mono
     heard: list[float] = []
+    waits_for = gateway.hardware.mavlink.waits_for
 
     def enough() -> bool:
         now = clock().mono
         if not heard and any(map(_is_heard, gateway.pipeline.hw.handles)):
             heard.append(now)
-        return now - heard[0] >= LISTEN if heard else now - start >= PATIENCE
+        if not heard:
+            return now - start >= PATIENCE
+        since = now - heard[0]
+        if since < LISTEN:
+            return False
+        waiting = waits_for()
+        if waiting and len(heard) == 1:
+            heard.append(now)
+            log.info("waiting up to %g s for the answers of %s", ANSWERS - LISTEN, "; ".join(waiting))
+        return since >= ANSWERS or not waiting
 
     gateway.run(until=enough)
+    for missing in waits_for():
+        log.warning("no answer yet from %s: a running gateway may know more", missing)
     return explanations(gateway.pipeline.hw, clock())
 
 

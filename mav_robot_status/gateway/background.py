@@ -106,7 +106,8 @@ class BackgroundGateway(Observer):
     def changes(self, handles: Iterable[str], most: int) -> list[tuple[str, Transition]]:
         """The latest changes of these handles, newest first, each with its handle."""
         with self._lock:
-            found = [(handle, change) for handle in handles for change in self._board.entries[handle].transitions]
+            entries = ((handle, self._board.entries.get(handle)) for handle in handles)
+            found = [(handle, change) for handle, entry in entries if entry is not None for change in entry.transitions]
         return sorted(found, key=lambda named: named[1].at)[: -most - 1 : -1]
 
     def _row(self, entry: Entry) -> Row:
@@ -135,6 +136,9 @@ class BackgroundGateway(Observer):
 
     def on_tick(self, handles: IndustrialRobotStatusInterface, now: Instant) -> None:
         """Update the explanation. Only this thread may read the hardware interface."""
+        if len(self._rates) > len(handles):  # some vehicles are gone
+            present = {(handle.detail.system, handle.detail.component) for handle in handles}
+            self._rates = {ids: rates for ids, rates in self._rates.items() if ids in present}
         if self.explained and now.mono >= self._explain_at:
             self._explain_at = now.mono + EXPLAIN_PERIOD
             self._explanation = self.gateway.pipeline.explain(self.explained, now)

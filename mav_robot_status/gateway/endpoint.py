@@ -8,10 +8,12 @@ from collections import OrderedDict
 from typing import TYPE_CHECKING, Final
 
 from ..hardware.mavlink.message_table import WANTED_IDS
+from ..links.base import ServesClients
 from ..links.guarded import open_guarded
 from ..links.url import parse
 from ..mavlink.counters import Counters
 from ..mavlink.framing import Parser
+from .speech import LIMIT, Speech
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,13 +28,15 @@ MOST_SOURCES: Final = 64
 """Limit of channels of one link. The one silent longest is dropped."""
 MOST_PEERS: Final = 8
 PEER_SILENCE: Final = 30.0  # s
+ACTIVE: Final = 10.0
+"""Seconds since the last valid frame for which a peer counts as active."""
 NEVER: Final = -math.inf
 
 
 class Channel:
     """One peer of a link: a MAVLink channel with its own sequence numbers. Compared by identity."""
 
-    __slots__ = ("encoders", "endpoint", "heard_at", "interval", "parser", "source")
+    __slots__ = ("active_at", "encoders", "endpoint", "frames", "heard_at", "interval", "parser", "source", "systems")
 
     def __init__(self, endpoint: Endpoint, source: Address, parser: Parser) -> None:
         self.endpoint = endpoint
@@ -45,6 +49,11 @@ class Channel:
         """Seconds between two ROBOT_STATUS, as this peer requested. None: the default. inf: no messages."""
         self.encoders: dict[int, Encoder] = {}
         """By our system id."""
+        self.frames = parser.counters.frames
+        """The frames of the parser when `note_activity` was called last."""
+        self.active_at = NEVER
+        self.systems: set[int] = set()
+        """The system ids of the vehicles that are heard there: messages about others are not sent there."""
 
     @property
     def is_out(self) -> bool:
@@ -75,20 +84,25 @@ class Endpoint:
         self.url = config.url
         """As in the configuration."""
         self.link: Link = open_guarded(url)
+        if isinstance(self.link, ServesClients):
+            self.link.is_active = self.is_active
         self._serial = url.kind.is_serial
         self.number: int
         """The number of the link in its gateway, from 0."""
         self.robot_status: bool
         """Whether ROBOT_STATUS is sent on this link, if it is a vehicle link."""
         self.passive: bool
+        self.speech = Speech()
         self._wanted: frozenset[int] | None = WANTED_IDS
         self._channels: OrderedDict[Address, Channel] = OrderedDict()
-        self.adjust(config, number, keep_all=keep_all)
         self.is_out = is_out
+        self.adjust(config, number, keep_all=keep_all)
         self.must_speak = url.kind.speaks_first
         self.listens = url.kind.listens
         """Whether each source address is a peer. Otherwise the link has one peer, whatever the address."""
         self._source: Address = None
+        self.connections = 0
+        """How many connections a link with one peer has had."""
         if not self.listens:
             self._only = self._channels[None] = Channel(self, None, Parser(self._wanted))
 
@@ -96,6 +110,9 @@ class Endpoint:
         """Change an open link: everything except its URL."""
         self.number, self.passive = number, config.passive
         self.robot_status = not self._serial if config.robot_status is None else config.robot_status
+        default = None if self.is_out else LIMIT
+        self.speech_limit = (config.speech_limit or None) if config.speech_limit is not None else default
+        self.speech.renew(self.speech_limit)
         wanted = None if keep_all else WANTED_IDS
         if wanted is not self._wanted:
             self._wanted = wanted
@@ -109,6 +126,7 @@ class Endpoint:
         if not self.listens:
             if source != self._source:  # a new connection: drop the incomplete frame of the last one
                 self._source = source
+                self.connections += 1
                 self._only.parser.reset()
             return self._only
         channel = self._channels.get(source)
@@ -145,9 +163,18 @@ class Endpoint:
         """Whether we send to this channel, and accept its requests."""
         return channel.heard_at > NEVER or not self.listens
 
+    def is_active(self, source: Address) -> bool:
+        """Whether valid frames arrive from this address. A server with too many clients drops others first."""
+        channel = self._channels.get(source)
+        return channel is not None and (channel.active_at > NEVER or channel.parser.counters.frames != channel.frames)
+
     def forget_silent(self, now: float) -> None:
-        """Drop the peers that are silent for PEER_SILENCE, with their requested intervals."""
+        """Drop the peers that are silent for PEER_SILENCE, with their requested intervals. Called once a second."""
         for channel in self._channels.values():
+            if channel.parser.counters.frames != channel.frames:
+                channel.frames, channel.active_at = channel.parser.counters.frames, now
+            elif now - channel.active_at > ACTIVE:
+                channel.active_at = NEVER
             if now - channel.heard_at > PEER_SILENCE:
                 channel.heard_at, channel.interval = NEVER, None if self.listens else channel.interval
 
@@ -175,7 +202,7 @@ class Endpoint:
         got = self.totals()
         log.info(
             "%s: %d frames, %d lost, %d with a bad CRC, %d with an unknown id, %d bytes of garbage, "
-            "%d datagrams dropped",
+            "%d datagrams dropped; sent %d bytes unasked, %d messages held back",
             self.link.text,
             got.frames,
             got.lost,
@@ -183,4 +210,6 @@ class Endpoint:
             sum(got.unknown.values()),
             got.garbage_bytes,
             self.link.dropped,
+            self.speech.said,
+            self.speech.withheld,
         )

@@ -63,6 +63,12 @@ class GuardedPublisher:
         """Do pending work."""
         return self._guard.call(None, self._publisher.service, now)
 
+    def forget(self, handle: str) -> None:
+        """Release what belongs to a handle that is gone."""
+        forget = getattr(self._publisher, "forget", None)
+        if callable(forget):
+            self._guard.call(None, forget, handle)
+
     @property
     def queued(self) -> int:
         """Messages that wait in the publisher; 0 if it does not count them."""

@@ -16,12 +16,13 @@ from ..mavlink.signing import Verdict
 from .endpoint import Endpoint
 from .path_selection import PathSelection
 from .routing import Router
-from .sender import Sender
+from .sender import Sender, speaks_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
     from ..clock import Instant
+    from ..hardware.mavlink.requests.scheduler import Ask
     from ..hardware.mavlink.vehicle import TrackedVehicle
     from ..links.base import Address
     from ..mavlink.framing import Frame
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 NONE: Final[frozenset[tuple[int, int]]] = frozenset()
+REQUEST_SIZE: Final = 45  # bytes of a COMMAND_LONG
 BATCH: Final = 64
 """Pieces read before parsing. Bounds the memory in a flood of long pieces."""
 SETUP_SIGNING: Final = 256
@@ -178,6 +180,7 @@ class LinkHub:
         """Note a heartbeat of a vehicle on this channel."""
         self._note_heartbeat(channel, now)
         self.paths.learn(ids, channel, now)
+        channel.systems.add(ids[0])
 
     def _note_heartbeat(self, channel: Channel, now: float) -> None:
         if channel.endpoint.heard(channel, now):
@@ -228,7 +231,7 @@ class LinkHub:
     def audiences(self) -> list[Audience]:
         """The receivers of statuses: peers and outs. Not serial vehicle links: autopilots drop unknown ids."""
         return [
-            Audience(channel, channel.interval, mirror=endpoint.is_out)
+            Audience(channel, channel.interval, endpoint.is_out, None if endpoint.is_out else channel.systems)
             for endpoint in self.endpoints
             if self._gets_statuses(endpoint)
             for channel in endpoint.peers()
@@ -244,18 +247,42 @@ class LinkHub:
 
     def send(self, message: Any, system: int, audience: Audience) -> None:
         """`MavlinkPort`: send a message about the vehicle with this system id."""
-        self.send_to(audience.key, message, system)
+        channel: Any = audience.key
+        self.sender.send_unasked(channel, message, system)
 
     def send_to(self, channel: Any, message: Any, system: int) -> None:
         """Send one message on one channel, with our ids for this system."""
         self.sender.send(channel, message, system)
 
-    def send_heartbeats(self, vehicles: Iterable[TrackedVehicle], now: float) -> None:
-        """Send our heartbeat on all links. Called once a second."""
+    def speak(self, vehicles: Sequence[TrackedVehicle], now: float) -> None:
+        """Send our heartbeats, and what waited for its turn. Called once a second."""
         for endpoint in self.endpoints:
             endpoint.forget_silent(now)
+            for channel in endpoint.channels():
+                channel.systems.clear()
         self._channels = None
-        self.sender.send_heartbeats(self.endpoints, vehicles)
+        self.paths.retain({tracked.ids for tracked in vehicles})
+        for tracked in vehicles:
+            path = self.paths.channel(tracked.ids) if tracked.ids is not None and speaks_for(tracked) else None
+            if path is not None and tracked.ids is not None:
+                path.systems.add(tracked.ids[0])
+        self.sender.speak(self.endpoints, vehicles, self.config.identity.heartbeat)
+
+    def ask(self, request: Ask) -> None:
+        """Send a request to a vehicle."""
+        path = self.paths.channel((request.system, request.component))
+        if path is not None:
+            path.endpoint.speech.count(self.sender.send(path, request.message, request.system))
+
+    def vehicles_on(self, endpoint: Endpoint) -> list[tuple[int, int]]:
+        """The ids of the vehicles that are heard on a link."""
+        paths = ((ids, self.paths.channel(ids)) for ids in self.paths.vehicles())
+        return [ids for ids, path in paths if path is not None and path.endpoint is endpoint]
+
+    def may_ask(self, ids: tuple[int, int], number: int) -> bool:
+        """Whether the link of a vehicle has room for this number of requests and one more, in this second."""
+        path = self.paths.channel(ids)
+        return path is not None and path.endpoint.speech.has_room_for(number * REQUEST_SIZE)
 
     # logging and closing
 

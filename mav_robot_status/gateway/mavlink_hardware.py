@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config
-    from ..hardware.mavlink.requests.scheduler import Ask
     from ..interface import IndustrialRobotStatusInterface, IoSource
     from ..mavlink.framing import Frame
     from .endpoint import Channel, Endpoint
@@ -51,7 +50,7 @@ class MavlinkHardware:
         self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
         self.changed = False
         self.observers = observers
-        self._heartbeat_due = math.inf
+        self._heartbeat_due = AT_ONCE
         self._timer_due = AT_ONCE
         """The first of `_heartbeat_due` and `_silent_at`."""
         self._silent_at = clock().mono + FIRST_SILENCE
@@ -60,10 +59,6 @@ class MavlinkHardware:
     def _configure(self, config: Config) -> None:
         self._config = config
         self.vehicles.asks = config.requests == "missing" and not all(link.passive for link in config.links)
-        if not config.identity.heartbeat:
-            self._heartbeat_due = math.inf
-        elif self._heartbeat_due == math.inf:
-            self._heartbeat_due = AT_ONCE
         self._timer_due = AT_ONCE
         if publishes(config, "mavlink"):
             self.hub.offered |= {ROBOT_STATUS}
@@ -117,25 +112,20 @@ class MavlinkHardware:
     def write(self, now: Instant) -> None:
         """Send the due requests and heartbeats."""
         if self.vehicles.asks:
-            for ask in self.vehicles.due_requests(now, self.hub.passive_vehicles()):
-                self._send(ask)
+            # the autopilot acknowledges to these ids
+            self.vehicles.speak_as(self._config.identity.system, self.hub.sender.component.id)
+            for ask in self.vehicles.due_requests(now, self.hub.passive_vehicles(), self.hub.may_ask):
+                self.hub.ask(ask)
         if self.hub.sender.signing_policy is not None:
             self.hub.sender.signing_policy.keep()
         if now.mono >= self._timer_due:
             self._serve_timers(now.mono)
 
-    def _send(self, request: Ask) -> None:
-        path = self.hub.paths.channel((request.system, request.component))
-        if path is not None:
-            # the autopilot acknowledges to these ids
-            self.vehicles.speak_as(self._config.identity.system, self.hub.sender.component.id)
-            self.hub.send_to(path, request.message, request.system)
-
     def _serve_timers(self, now: float) -> None:
         if now >= self._heartbeat_due:
             late = now - self._heartbeat_due > HEARTBEAT_PERIOD
             self._heartbeat_due = (now if late else self._heartbeat_due) + HEARTBEAT_PERIOD
-            self.hub.send_heartbeats(self.vehicles.vehicles, now)
+            self.hub.speak(list(self.vehicles.vehicles), now)
         if now >= self._silent_at:
             self._log_silence(now)
         self._timer_due = min(self._heartbeat_due, self._silent_at)
@@ -158,6 +148,10 @@ class MavlinkHardware:
         """Update the evidence in this handle to `now`."""
         self.vehicles.explain(handle, now)
 
+    def waits_for(self) -> list[str]:
+        """What the vehicles were asked for and may still answer, one line for each vehicle."""
+        return self.vehicles.waits_for() if self.vehicles.asks else []
+
     def forget(self) -> None:
         """Forget all vehicles."""
         self.vehicles.forget()
@@ -174,10 +168,11 @@ class MavlinkHardware:
 class LinkSource:
     """One link of a hub, as a source."""
 
-    __slots__ = ("_endpoint", "_hardware", "_hub", "close", "fileno", "next_due")
+    __slots__ = ("_connections", "_endpoint", "_hardware", "_hub", "close", "fileno", "next_due")
 
     def __init__(self, endpoint: Endpoint, hardware: MavlinkHardware) -> None:
         self._endpoint = endpoint
+        self._connections = endpoint.connections
         self._hardware = hardware
         self._hub = hardware.hub
         self.fileno, self.next_due, self.close = endpoint.link.fileno, endpoint.link.due, endpoint.link.close
@@ -188,6 +183,9 @@ class LinkSource:
         if not heard:
             return
         hardware = self._hardware
+        if self._endpoint.connections != self._connections:
+            self._connections = self._endpoint.connections
+            hardware.vehicles.reconnected(self._hub.vehicles_on(self._endpoint), now.mono)
         take = hardware.vehicles.take
         for frame, channel in heard:
             vehicle = take(frame, now)

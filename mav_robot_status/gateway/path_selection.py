@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Container, Iterable
 
     from ..mavlink.framing import Frame
 
@@ -84,6 +84,11 @@ class PathSelection(Generic[C]):
                     continue
                 path.route = others.pop(max(others, key=lambda channel: others[channel].at))
             path.others = others
+
+    def retain(self, ids: Container[tuple[int, int] | None]) -> None:
+        """Forget all other vehicles."""
+        for gone in [one for one in self._paths if one not in ids]:
+            del self._paths[gone]
 
     def take(self, ids: tuple[int, int], channel: C, now: float) -> None:
         """Select the route of a frame that is known to be newer than all before."""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from ..config import Config, ControllerConfig, PublisherConfig
-    from ..interface import HardwareInterface, MavlinkPort, Metrics, Publisher
+    from ..interface import HardwareInterface, IndustrialRobotStatusHandle, MavlinkPort, Metrics, Publisher
     from .observer import Observer
 
 NEVER: Final = Instant(0.0, 0)
@@ -85,10 +85,13 @@ class Pipeline:
         self._idle: list[GuardedController] = []
         """The controllers that do not run."""
         self._controllers_due = math.inf
-        self._seen: set[str] = set()
+        self._seen: dict[str, IndustrialRobotStatusHandle] = {}
+        """The handles that have their controllers."""
+        self._version = -1
+        """The version of the handles at that time."""
         for controller in self._configs:  # before the first heartbeat, so that a faulty output fails at the start
             self._publishers(controller)
-        self._serve_new_handles()
+        self._serve_handles(NEVER)
 
     def change(self, config: Config, renewed: Callable[[], HardwareInterface], now: Instant) -> None:
         """Apply another configuration. Publishers that are in both configurations are kept.
@@ -123,7 +126,8 @@ class Pipeline:
     def tick(self, now: Instant) -> None:
         """Read the hardware, update the controllers that are due or whose handle has changed, serve the publishers."""
         self.hw.read(now)
-        self._serve_new_handles()
+        if self.hw.handles.version != self._version:
+            self._serve_handles(now)
         self.now = now
         if self._idle or self.hw.changed or now.mono >= self._controllers_due:
             self._update(now)
@@ -181,20 +185,40 @@ class Pipeline:
         handle = controller.handle
         return handle.name in self._named or handle.detail.link is not LinkState.NEVER_SEEN
 
-    def _serve_new_handles(self) -> None:
-        """Make the controllers of handles that were registered since the last call."""
-        if len(self.hw.handles) == len(self._seen):
-            return
-        for name in self.hw.handles.get_names():
+    def _serve_handles(self, now: Instant) -> None:
+        """End the controllers of removed handles, and make those of new ones."""
+        self._version = self.hw.handles.version
+        present = {handle.name: handle for handle in self.hw.handles}
+        gone = [handle for name, handle in self._seen.items() if present.get(name) is not handle]
+        if gone:
+            self._end(gone, now)
+        for name, handle in present.items():
             if name in self._seen:
                 continue
-            self._seen.add(name)
+            self._seen[name] = handle
             for controller in self._configs:
                 if is_default(controller):
                     parameters = {**controller.parameters, "handle_name": name}
                     self._add_controller(dataclasses.replace(controller, parameters=parameters))
                 elif handle_name(controller) == name:
                     self._add_controller(controller)
+
+    def _end(self, gone: Sequence[IndustrialRobotStatusHandle], now: Instant) -> None:
+        """Publish the last status of these handles, and end their controllers."""
+        names = [handle.name for handle in gone]
+        for controller in self._controllers:
+            if controller.handle.name in names and controller.running:
+                controller.update(now)
+                controller.stop(now)
+        self._controllers = [c for c in self._controllers if c.handle.name not in names]
+        self._idle = [c for c in self._idle if c.handle.name not in names]
+        for publisher in self.publishers.values():
+            publisher.service(now)  # it hands on what it holds before it forgets the handle
+            forget: Callable[[str], None] = getattr(publisher, "forget", _keep)
+            for name in names:
+                forget(name)
+        for name in names:
+            del self._seen[name]
 
     def _add_controller(self, config: ControllerConfig) -> None:
         """Raises ConfigError if the controller cannot be made."""
@@ -222,6 +246,10 @@ class Pipeline:
             trusted = plugins.is_part_of_this_package(made)
             self.publishers[key] = made if trusted else GuardedPublisher(made, config.type)
         return self.publishers[key]
+
+
+def _keep(handle: str) -> None:
+    """A publisher that keeps nothing for a handle has nothing to forget."""
 
 
 @contextmanager

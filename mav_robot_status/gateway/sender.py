@@ -5,13 +5,14 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from ..interface import TriState
+from ..interface import LinkState, TriState
 from ..links.record import TlogWriter
 from ..mavlink.component import DEFAULT_SYSTEM, Component
 from .signing_policy import SigningPolicy
+from .speech import Speech, Waiting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from ..clock import Instant
     from ..config import Config, SigningConfig
@@ -60,29 +61,69 @@ class Sender:
         if self.recorder is not None:
             log.info("%s", self.recorder.text)
 
-    def send(self, channel: Channel, message: Any, system: int) -> None:
-        """Send one message on one channel, with our ids for this system."""
-        self._send_frame(channel, self.component.frame(message, system, channel.encoders))
+    def send(self, channel: Channel, message: Any, system: int) -> int:
+        """Send one message on one channel, with our ids for this system. Returns its size in bytes."""
+        return self._send_frame(channel, self.component.frame(message, system, channel.encoders))
 
-    def send_heartbeat(self, channel: Channel, system: int, in_error: bool = False) -> None:
-        """Send our heartbeat for this system on one channel."""
-        self._send_frame(channel, self.component.heartbeat(system, in_error, channel.encoders))
+    def send_heartbeat(self, channel: Channel, system: int, in_error: bool = False) -> int:
+        """Send our heartbeat for this system on one channel, unless it would pass for a ground station's."""
+        if not self.component.may_beat(system):
+            return 0
+        return self._send_frame(channel, self.component.heartbeat(system, in_error, channel.encoders))
 
-    def send_heartbeats(self, endpoints: Iterable[Endpoint], vehicles: Iterable[TrackedVehicle]) -> None:
-        """Send a heartbeat for each known system on all links. Without any, only on links that must send first."""
+    def send_unasked(self, channel: Channel, message: Any, system: int) -> None:
+        """Send a message within the allowance of the link, or later."""
+        speech = channel.endpoint.speech
+        if channel.interval is not None:  # the peer has asked for it
+            if speech.has_room_for_asked:
+                speech.count_asked(self.send(channel, message, system))
+            else:
+                speech.withheld += 1
+            return
+        key = channel, type(message), getattr(message, "subject_component", 0), getattr(message, "name", b""), system
+        speech.wait(key, Waiting(channel, message, system))
+        self._send_waiting(speech)
+
+    def _send_waiting(self, speech: Speech) -> None:
+        while (waiting := speech.next_waiting()) is not None:
+            channel, message, system = waiting
+            if channel.endpoint.is_out or system in channel.systems:
+                speech.count(self.send(channel, message, system))
+
+    def speak(self, endpoints: Iterable[Endpoint], vehicles: Iterable[TrackedVehicle], beats: bool) -> None:
+        """Renew the allowances; send our heartbeats, then what waits. Called once a second.
+
+        A heartbeat for a system goes to the channels on which its vehicles are heard, and to the outs. On a link that
+        must send first there is one even without a vehicle.
+        """
+        self.component.pass_second()
         in_error: dict[int, bool] = {}
         for tracked in vehicles:
-            if tracked.ids is not None:
-                system = self.component.system_for(tracked.ids[0])
+            if tracked.ids is not None and speaks_for(tracked):
+                system = tracked.ids[0]
                 in_error[system] = in_error.get(system, False) or tracked.handle.status.in_error is TriState.TRUE
         for endpoint in endpoints:
-            if endpoint.passive or (not in_error and (endpoint.is_out or not endpoint.must_speak)):
+            speech = endpoint.speech
+            speech.renew(endpoint.speech_limit)
+            if endpoint.passive:
                 continue
-            for channel in endpoint.peers():
-                for system, faulty in (in_error or {DEFAULT_SYSTEM: False}).items():
-                    self.send_heartbeat(channel, system, faulty)
+            if beats:
+                speech.in_turn(list(self._beats(endpoint, in_error)), lambda beat: self.send_heartbeat(*beat))
+            self._send_waiting(speech)
 
-    def _send_frame(self, channel: Channel, frame: bytes) -> None:
+    def _beats(self, endpoint: Endpoint, in_error: Mapping[int, bool]) -> Iterator[tuple[Channel, int, bool]]:
+        """The heartbeats that are due on a link: channel, system, and whether a vehicle of the system is in error."""
+        for channel in endpoint.peers():
+            ours: dict[int, bool] = {}
+            for system, faulty in in_error.items():
+                if endpoint.is_out or system in channel.systems:
+                    own = self.component.system_for(system)
+                    ours[own] = ours.get(own, False) or faulty
+            if not ours and endpoint.must_speak and not endpoint.is_out:
+                ours = {DEFAULT_SYSTEM: False}
+            yield from ((channel, own, faulty) for own, faulty in ours.items())
+
+    def _send_frame(self, channel: Channel, frame: bytes) -> int:
         if self.signing_policy is not None or self.recorder is not None:
             unix_us = self._clock().unix_us
             if self.signing_policy is not None:
@@ -90,3 +131,9 @@ class Sender:
             if self.recorder is not None and not channel.passive:
                 self.recorder.write(unix_us, frame)
         channel.send(frame)
+        return len(frame)
+
+
+def speaks_for(tracked: TrackedVehicle) -> bool:
+    """Whether we speak for a vehicle: while it is heard, and after a loss if it was there for a while."""
+    return tracked.handle.detail.link is LinkState.CONNECTED or tracked.established

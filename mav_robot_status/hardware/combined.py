@@ -25,7 +25,7 @@ class CombinedRobotHW(RobotHW):
         super().__init__()
         self._parts = parts
         self._collected: list[int] = [0] * len(parts)
-        """Handles of each part that were collected."""
+        """The version of the handles of each part that were collected."""
         self._collect()
 
     def read(self, now: Instant) -> None:
@@ -68,11 +68,17 @@ class CombinedRobotHW(RobotHW):
                 steps.callback(part.close)
 
     def _collect(self) -> None:
-        """Collect the handles that were registered since the last call."""
-        for number, part in enumerate(self._parts):
-            if len(part.handles) != self._collected[number]:
-                self._collected[number] = len(part.handles)
-                self._offer(part)
+        """Collect the handles that were registered or removed since the last call."""
+        versions = [part.handles.version for part in self._parts]
+        if versions == self._collected:
+            return
+        self._collected = versions
+        offered = {id(handle) for part in self._parts for handle in part.handles}
+        for handle in list(self.handles):
+            if id(handle) not in offered:
+                self.handles.remove_handle(handle.name)
+        for part in self._parts:
+            self._offer(part)
 
     def _offer(self, part: HardwareInterface) -> None:
         known = {handle.name: handle for handle in self.handles}

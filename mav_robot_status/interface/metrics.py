@@ -32,6 +32,10 @@ class ConnectionMetrics(NamedTuple):
     garbage_bytes: int
     dropped: int
     """Messages that could not be sent, and datagrams that the kernel dropped."""
+    said: int = 0
+    """Bytes that we sent without being asked."""
+    withheld: int = 0
+    """Messages that we held back because of `speech_limit`."""
 
 
 class PublisherMetrics(NamedTuple):

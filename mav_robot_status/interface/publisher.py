@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TextIO
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Container, Hashable, Mapping, Sequence
 
     from ..clock import Instant
     from .metrics import Metrics
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 class Publisher(Protocol):
     """One output. No method blocks: a publisher that cannot accept a message is `busy`, and is tried again soon.
+
+    A publisher may have one more method, `forget(handle)`: this handle is gone, and no message of it follows. Its last
+    message has the link state NEVER_SEEN. Release what belongs to the handle.
 
     A publisher class may set two more attributes. Both default to False:
 
@@ -50,6 +53,8 @@ class Audience(NamedTuple):
     inf: no messages."""
     mirror: bool = False
     """True for ground stations, which may not know ROBOT_STATUS; False for a vehicle."""
+    systems: Container[int] | None = None
+    """The system ids of the vehicles that it gets messages about. None: all."""
 
 
 class MavlinkPort(Protocol):

@@ -21,6 +21,8 @@ class IndustrialRobotStatusInterface:
 
     def __init__(self) -> None:
         self._handles: dict[str, IndustrialRobotStatusHandle] = {}
+        self.version = 0
+        """Changes with every handle that is registered or removed."""
 
     def __len__(self) -> int:
         return len(self._handles)
@@ -33,6 +35,12 @@ class IndustrialRobotStatusInterface:
         if handle.name in self._handles:
             log.warning("replacing the handle '%s', which was registered before", handle.name)
         self._handles[handle.name] = handle
+        self.version += 1
+
+    def remove_handle(self, name: str) -> None:
+        """Remove a handle: its robot is gone for good. ORIGINAL: ros_control never removes one."""
+        del self._handles[name]
+        self.version += 1
 
     def get_handle(self, name: str) -> IndustrialRobotStatusHandle:
         """The handle of that name. Raises UnknownHandleError, which lists the registered names."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Hashable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 Address = Hashable
 """The source of received bytes. Each connection of a stream has an address of its own, so that the bytes of two
@@ -59,3 +59,11 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Close the sockets or the device. May be called again."""
+
+
+@runtime_checkable
+class ServesClients(Protocol):
+    """A link with a limited number of clients, which drops an inactive one for a new one."""
+
+    is_active: Callable[[Address], bool]
+    """Whether valid frames arrive from a client. The owner of the link sets it: a link knows no frames."""

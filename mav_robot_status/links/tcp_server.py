@@ -9,6 +9,8 @@ import math
 import random
 import select
 import socket
+from collections import Counter
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from mav_robot_status.links.base import Address, Received
@@ -21,7 +23,7 @@ from mav_robot_status.links.url import Url, host_port
 log = logging.getLogger(__name__)
 
 MAX_CLIENTS = 8
-"""The most clients at a time; the link refuses further ones."""
+"""The most clients at a time. Clients that send no valid frames give way to new ones."""
 MAX_ACCEPTS = 16
 """The most connections that one `receive` accepts."""
 RETRY = 0.2, 5.0
@@ -36,6 +38,7 @@ class Client(NamedTuple):
     socket: socket.socket
     stream: Stream
     where: str
+    host: str
 
 
 class TcpServerLink:
@@ -53,12 +56,15 @@ class TcpServerLink:
         """
         self.text = url.words()
         self.dropped = 0
+        self.is_active: Callable[[Address], bool] = lambda source: True
         self.refused = 0
         """How many clients were refused because there were MAX_CLIENTS."""
         self._backoff = Backoff(*RETRY, fraction)
         self._state_log = StateLog(log)
         self._clients: dict[int, Client] = {}
         self._numbers = itertools.count(1)
+        self._dropped_idle = False
+        """An idle client was dropped, and the log says so."""
         self._exhausted = False
         """No free descriptor for a client since the last `service`."""
         self._local_port = LocalPort(url, _new_socket, socket.SOCK_STREAM, self._state_log)
@@ -143,7 +149,7 @@ class TcpServerLink:
 
     def _add_client(self, new: socket.socket, address: tuple[Any, ...]) -> None:
         where = host_port(*address[:2])
-        if len(self._clients) >= MAX_CLIENTS:
+        if len(self._clients) >= MAX_CLIENTS and not self._make_room():
             new.close()
             self.refused += 1
             if self.refused == 1:
@@ -151,8 +157,21 @@ class TcpServerLink:
             return
         self._backoff.reset()
         stream = Stream(self._epoll, tuned(new).fileno(), (*address[:2], next(self._numbers)))
-        self._clients[new.fileno()] = Client(new, stream, where)
+        self._clients[new.fileno()] = Client(new, stream, where, address[0])
         log.info("%s: %s has connected", self.text, where)
+
+    def _make_room(self) -> bool:
+        """Drop a client that sends no valid frames: of the host with the most clients, the one that came first."""
+        idle = [client for client in self._clients.values() if not self.is_active(client.stream.address)]
+        if not idle:
+            return False
+        clients = Counter(client.host for client in self._clients.values())
+        oldest = max(idle, key=lambda client: clients[client.host])
+        if not self._dropped_idle:
+            log.warning("%s: %s sends no valid frames and makes room for a new client", self.text, oldest.where)
+        self._dropped_idle = True
+        self._drop(oldest)
+        return True
 
     def _send(self, client: Client, data: bytes) -> bool:
         try:

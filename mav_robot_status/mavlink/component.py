@@ -17,6 +17,7 @@ from .enumerations import (
     MAV_AUTOPILOT_INVALID,
     MAV_STATE_ACTIVE,
     MAV_STATE_CRITICAL,
+    MAV_TYPE_GCS,
     MAV_TYPE_ONBOARD_CONTROLLER,
 )
 
@@ -29,6 +30,10 @@ COMPONENTS: Final = (192, 193, 194, 191)
 DEFAULT_SYSTEM: Final = 245
 """The system id before the first vehicle is known, on links where we must send first."""
 MAVLINK_VERSION: Final = 3
+GROUND_STATION: Final = 255
+"""The default of ArduPilot's SYSID_MYGCS, and of all ground stations."""
+GROUND_STATION_SILENCE: Final = 60
+"""Seconds after which a ground station is forgotten."""
 SENT_KEPT: Final = 64
 """How many of our heartbeats we remember for each system, over all channels: a router may send them back to us."""
 
@@ -45,6 +50,9 @@ class Component:
         self._encoders: dict[int, Encoder] = {}
         self._systems: set[int] = set()
         """Systems under whose id we have sent."""
+        self._ground_stations: dict[int, int] = {}
+        """Systems that a ground station uses, with the seconds since its last HEARTBEAT."""
+        self._warned: set[int] = set()
         self._sent: dict[int, deque[tuple[int, int, Heartbeat]]] = {}
 
     def system_for(self, vehicle: int) -> int:
@@ -82,9 +90,34 @@ class Component:
         message = Heartbeat(0, MAV_TYPE_ONBOARD_CONTROLLER, MAV_AUTOPILOT_INVALID, 0, state, MAVLINK_VERSION)
         return self.frame(message, vehicle, encoders)
 
+    def may_beat(self, vehicle: int) -> bool:
+        """Whether our HEARTBEAT about this vehicle may be sent. It must not pass for that of a ground station.
+
+        ArduPilot takes every HEARTBEAT of the system SYSID_MYGCS, by default 255, as a sign of life of its ground
+        station, and does not begin its failsafe while they arrive.
+        """
+        system = self.system_for(vehicle)
+        if system != GROUND_STATION and system not in self._ground_stations:
+            return True
+        if system not in self._warned:
+            self._warned.add(system)
+            log.warning(
+                "no HEARTBEAT of ours as system %d: a ground station uses this id, and autopilots would not notice its "
+                "loss; give it, or us (identity: {system: ...}), another id",
+                system,
+            )
+        return False
+
+    def pass_second(self) -> None:
+        """A second has passed: forget the ground stations that are silent."""
+        ages = self._ground_stations.items()
+        self._ground_stations = {system: age + 1 for system, age in ages if age < GROUND_STATION_SILENCE}
+
     def observe(self, frame: Frame) -> None:
         """Process a received HEARTBEAT: if another program uses our component id, change ours."""
         system, component = frame.ids
+        if frame.message.type == MAV_TYPE_GCS:
+            self._ground_stations[system] = 0
         if component not in self._ids:
             return
         if (component, frame.sequence, frame.message) in self._sent.get(system, ()):

@@ -112,6 +112,12 @@ class Board:
             self._change(entry, rest, stamp, now)
         entry.stamp, entry.at, entry.heartbeat_age = stamp, now, link.get("heartbeat_age")
 
+    def forget(self, handle: str) -> None:
+        """Remove the entry of a handle that is gone."""
+        self._seen.pop(handle, None)
+        if self.entries.pop(handle, None) is not None:
+            self.version += 1
+
     def _entry(self, handle: str, now: float) -> Entry | None:
         entry = self.entries.get(handle)
         if entry is None:
@@ -162,6 +168,11 @@ class BoardPublisher:
                 for msg in self._waiting:
                     self.board.update(msg, now.mono)
             self._waiting.clear()
+
+    def forget(self, handle: str) -> None:
+        """Remove a handle that is gone from the board."""
+        with self.lock:
+            self.board.forget(handle)
 
     def close(self) -> None:
         """Nothing to release."""

@@ -177,6 +177,11 @@ class JsonLinesPublisher:
             self._writable()
         return now.mono + RETRY if self._rest else None
 
+    def forget(self, handle: str) -> None:
+        """Release what belongs to a handle that is gone."""
+        self._seq.pop(handle, None)
+        self._bodies.pop(handle, None)
+
     def close(self) -> None:
         """Write the rest of a line if the pipe has room, and close the file."""
         try:

@@ -98,6 +98,13 @@ CONNECTION: Final = (
         "Messages that could not be sent, and datagrams that the kernel dropped.",
         lambda c: c.dropped,
     ),
+    Family("connection_unasked_bytes_total", COUNTER, "Bytes that were sent without being asked.", lambda c: c.said),
+    Family(
+        "connection_held_back_total",
+        COUNTER,
+        "Messages that were held back because of speech_limit.",
+        lambda c: c.withheld,
+    ),
     Family("connection_peers", GAUGE, "Ends that are spoken to.", lambda c: c.peers),
 )
 PUBLISHER: Final = (

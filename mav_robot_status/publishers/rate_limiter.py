@@ -125,6 +125,12 @@ class RateLimitedPublisher(ABC, Generic[S]):
                 again = min(again, due)
         return None if again == math.inf else again
 
+    def forget(self, handle: str) -> None:
+        """Release what belongs to a handle that is gone."""
+        self._latest.pop(handle, None)
+        for states in self._states.values():
+            states.pop(handle, None)
+
     def close(self) -> None:
         """Nothing to release."""
 
@@ -135,6 +141,8 @@ class RateLimitedPublisher(ABC, Generic[S]):
             return math.inf
         due = math.inf
         for audience in self._audiences:
+            if audience.systems is not None and msg.detail.system not in audience.systems:
+                continue
             states = self._states[audience.key]
             state = states.get(handle)
             if state is None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from .codec import DecodedMessage
-from .definitions import CommandAck, ParamValue
+from .definitions import CommandAck, MessageInterval, ParamValue
 from .firmware import (
     ACCEPTED,
     ARDUPILOT,
@@ -27,7 +27,8 @@ from .vehicle_model import VehicleModel
 CUSTOM_MODE_ENABLED = 1
 FORCED = 21196
 GCS = 6
-SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, ARM_DISARM, DO_SET_MODE, SET_MODE, DO_AUX_FUNCTION = 511, 512, 400, 176, 11, 218
+GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
+ARM_DISARM, DO_SET_MODE, SET_MODE, DO_AUX_FUNCTION = 400, 176, 11, 218
 MOTOR_ESTOP = 31
 """The auxiliary function of ArduPilot that stops all motors."""
 LOW, HIGH = 0, 2
@@ -69,6 +70,15 @@ def _set_message_interval(model: VehicleModel, m: DecodedMessage) -> int:
         model.request(int(message_id), min(max(microseconds / 1e6, 0.001), 60.0))
     else:  # negative or NaN
         return DENIED
+    return ACCEPTED
+
+
+def _get_message_interval(model: VehicleModel, m: DecodedMessage) -> int:
+    if not can_send(model.firmware, m.param1):
+        return FAILED
+    message_id = int(m.param1)
+    interval = model.interval(message_id)
+    model.send(MessageInterval(-1 if interval is None else round(interval * 1e6), message_id))
     return ACCEPTED
 
 
@@ -146,6 +156,7 @@ def _param_request_read(model: VehicleModel, m: DecodedMessage) -> None:
 
 
 COMMANDS: dict[int, Callable[[VehicleModel, DecodedMessage], int]] = {
+    GET_MESSAGE_INTERVAL: _get_message_interval,
     SET_MESSAGE_INTERVAL: _set_message_interval,
     REQUEST_MESSAGE: _request_message,
     ARM_DISARM: _arm_disarm,

@@ -170,6 +170,12 @@ ARDUCOPTER = Firmware(
     ready=_COPTER_READY,
 )
 
+ARDUCOPTER_QUICK = ARDUCOPTER._replace(
+    name="ArduPilot Copter that is ready at its first heartbeat",
+    booting=_COPTER_READY,
+    boot=(step(1.24, "booted", (6, "ArduPilot Ready")),),
+)
+
 PX4_QUAD = Firmware(
     name="PX4 quad",
     version=0x01110040,

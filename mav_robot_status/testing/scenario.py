@@ -99,6 +99,8 @@ class Scenario(NamedTuple):
     steps: tuple[Step, ...] = ()
     streams: Mapping[int, float] | None = None
     """Message id to Hz: the streams that run without a request; None: the defaults of the firmware."""
+    streams_after: float = 0.0
+    """Seconds from the first heartbeat of a boot until these streams begin."""
 
     @property
     def duration(self) -> float:

@@ -81,6 +81,8 @@ class VehicleModel:
         self._intervals = {HEARTBEAT: 1.0, PREARM_TICK: 1.0, APPLET_TICK: 1.0}
         self._intervals |= {message: 1 / hz for message, hz in self.default_streams.items()}
         self._due = {message: at + interval for message, interval in self._intervals.items()}
+        for message in self.default_streams:
+            self._due[message] += self.scenario.streams_after
         self._due[HEARTBEAT] = at
 
     def _plan(self, start: float, steps: Iterable[Step]) -> None:
@@ -205,6 +207,10 @@ class VehicleModel:
             self._power_on(self._now + REBOOT_GAP)
         else:
             self.ended = True
+
+    def interval(self, message_id: int) -> float | None:
+        """The seconds between two messages of a stream; None: it does not run."""
+        return self._intervals.get(message_id)
 
     def request(self, message_id: int, interval: float | None) -> None:
         """Stream a message every `interval` seconds from now on; None stops it."""

@@ -18,6 +18,7 @@ from .handlers import overheard, pass_time
 from .identity import is_autopilot, named
 from .message_table import COMMAND_IDS, HEARTBEAT_ID, KINDS
 from .moment import Moment
+from .newcomers import Newcomers
 from .options import HardwareOptions
 from .requests.scheduler import Ask, RequestScheduler
 from .rules.inhibits import inhibit
@@ -28,7 +29,7 @@ from .state.vehicle_state import begin
 from .vehicle import ExpectedVehicle, TrackedVehicle
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterator, Sequence
+    from collections.abc import Callable, Collection, Container, Iterator, Sequence
 
     from ...clock import Instant
     from ...mavlink.framing import Values
@@ -38,6 +39,12 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MOST_VEHICLES: Final = 256
+ESTABLISHED: Final = 10.0
+"""Seconds of heartbeats without a link loss after which a vehicle keeps its place and its handle."""
+LOGGED: Final = 5
+"""The most ids in one log line."""
+GONE: Final = 10.0
+"""Seconds after its link loss for which another vehicle keeps them: a few heartbeats may be forged, or a mistake."""
 
 
 class MavlinkRobotHW(RobotHW):
@@ -63,6 +70,9 @@ class MavlinkRobotHW(RobotHW):
         """The first deadline of all vehicles, monotonic seconds. -inf while a vehicle is in `dirty_vehicles`."""
         self.asks = False
         """Whether `due_requests` is called at all."""
+        self._newcomers = Newcomers()
+        self._expire_at = math.inf
+        """When (monotonic seconds) the first vehicle that is not established loses its place."""
         self._unheard = True
         """Whether the handles of vehicles that sent nothing still lack their inhibit LINK_STALE."""
         self.ignored = 0
@@ -127,6 +137,8 @@ class MavlinkRobotHW(RobotHW):
         if self._unheard:
             self._report_unheard(now)
         if now.mono >= self.deadline:
+            if now.mono >= self._expire_at:
+                self._expire(now.mono)
             self._look_again(now.mono)
             for tracked in self._tracked.values():
                 if now.mono >= tracked.moment.next and not tracked.dirty:
@@ -143,9 +155,29 @@ class MavlinkRobotHW(RobotHW):
             if tracked.handle.name == handle:
                 self._evaluate(tracked, now)
 
-    def due_requests(self, now: Instant, passive: Container[tuple[int, int]] = ()) -> list[Ask]:
-        """The requests to send at `now`, none to vehicles on `passive` links."""
-        return self._asking.due(self._tracked, now.mono, passive)
+    def due_requests(
+        self,
+        now: Instant,
+        passive: Container[tuple[int, int]] = (),
+        has_room: Callable[[tuple[int, int], int], bool] = lambda ids, number: True,
+    ) -> list[Ask]:
+        """The requests to send at `now`, none to vehicles on `passive` links.
+
+        `has_room` says whether the link of a vehicle has room for this number of requests and one more.
+        """
+        return self._asking.due(self._tracked, now.mono, passive, has_room)
+
+    def reconnected(self, ids: Collection[tuple[int, int]], now: float) -> None:
+        """The connection to these vehicles is a new one: they may have rebooted, and lost what they were asked for."""
+        for one in ids:
+            tracked = self._tracked.get(one)
+            if tracked is not None and tracked.requests is not None:
+                tracked.requests.look_again(now)
+                self._asking.next_due = -math.inf
+
+    def waits_for(self) -> list[str]:
+        """What vehicles were asked for and have not sent yet, one line for each vehicle that still may send it."""
+        return [line for tracked in self._tracked.values() if (line := self._asking.waits_for(tracked)) is not None]
 
     def conflict(self, ids: tuple[int, int], now: Instant) -> None:
         """Report that two autopilots use the ids of this vehicle, on different paths."""
@@ -173,6 +205,7 @@ class MavlinkRobotHW(RobotHW):
 
         Statuses do not change until the next `read`.
         """
+        self._expire_at = -math.inf
         for ids, theirs in other._tracked.items():
             name = theirs.handle.name if other._open else None
             tracked = None if theirs.state is None else self._place(ids, name)
@@ -181,6 +214,7 @@ class MavlinkRobotHW(RobotHW):
             ours = tracked.handle
             ours.status, ours.detail, ours.heard_at = theirs.handle.status, theirs.handle.detail, theirs.handle.heard_at
             tracked.state, tracked.boots, tracked.losses = theirs.state, theirs.boots, theirs.losses
+            tracked.established = theirs.established
             tracked.requests, tracked.parameters = theirs.requests, theirs.parameters
             self._mark_dirty(tracked)
 
@@ -192,14 +226,7 @@ class MavlinkRobotHW(RobotHW):
         for tracked in self._tracked.values():
             if tracked.ids in keep:
                 continue
-            tracked.state, tracked.facts = None, ()
-            tracked.boots = 0
-            tracked.dirty, tracked.moment = False, Moment(-math.inf)
-            system, component = tracked.ids or (None, None)
-            tracked.handle.status = RobotStatus()
-            tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)
-            tracked.handle.heard_at = None
-            tracked.handle.evidence = {}
+            _make_unheard(tracked)
         self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked.dirty]
         self._find_deadline()
         self._unheard = True
@@ -236,13 +263,65 @@ class MavlinkRobotHW(RobotHW):
         """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
         if not is_autopilot(heartbeat, ids[1]):
             return None
-        tracked = self._place(ids)
+        tracked = self._place(ids) if self._has_place(ids, now.mono) else None
         if tracked is None:
             self.ignored += 1
             return None
         names = named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), named(mav.TYPE_NAMES, heartbeat.type)
         log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
         return tracked
+
+    def _has_place(self, ids: tuple[int, int], now: float) -> bool:
+        """Whether a vehicle with these ids that sends its first HEARTBEAT gets a place. Frees one if all are taken."""
+        if any(t.matches(*ids) for t in self._expected):
+            return True
+        if self._open:
+            full, holders = len(self._tracked) >= MOST_VEHICLES, list(self._tracked.values())
+        else:
+            full, holders = True, [t for t in self._expected if t.accepts(*ids) and not t.established]
+        if full and not holders:
+            return False
+        if not self._newcomers.admits(ids, full, now):
+            return False
+        if full:
+            silent = [t for t in holders if now - _last_heard(t) > self.options.heartbeat_timeout]
+            if not silent:
+                return False
+            self._remove([min(silent, key=lambda t: (t.established, _last_heard(t)))])
+        return True
+
+    def _is_passing(self, tracked: TrackedVehicle) -> bool:
+        """Whether it is silent, was heard only briefly, and the configuration does not name its handle."""
+        return self._open and tracked.handle.detail.link is LinkState.LOST and not tracked.established
+
+    def _expire(self, now: float) -> None:
+        """Free the places of the vehicles that are silent and were heard only briefly."""
+        passing = [tracked for tracked in self._tracked.values() if self._is_passing(tracked)]
+        keep = self.options.heartbeat_timeout + GONE
+        gone = [tracked for tracked in passing if now >= _last_heard(tracked) + keep]
+        self._expire_at = min((_last_heard(t) + keep for t in passing if t not in gone), default=math.inf)
+        if gone:
+            first = ", ".join("{}.{}".format(*(tracked.ids or (0, 0))) for tracked in gone[:LOGGED])
+            more = f" and {len(gone) - LOGGED} more" if len(gone) > LOGGED else ""
+            log.info("no longer a vehicle, heard only briefly: %s%s", first, more)
+            self._remove(gone)
+
+    def _remove(self, gone: list[TrackedVehicle]) -> None:
+        """Free the places of these vehicles. A handle that the configuration names stays, for another vehicle."""
+        for tracked in gone:
+            assert tracked.ids is not None
+            del self._tracked[tracked.ids]
+            _make_unheard(tracked)
+            if tracked in self._expected:
+                tracked.ids = None
+                tracked.handle.detail = Detail(tracked.slot.system, tracked.slot.component, link=LinkState.NEVER_SEEN)
+                tracked.requests = tracked.parameters = None
+                self._unheard = True
+            else:
+                self.handles.remove_handle(tracked.handle.name)
+        self.changed = True
+        self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked not in gone]
+        self._find_deadline()
 
     def _place(self, ids: tuple[int, int], name: str | None = None) -> TrackedVehicle | None:
         """A new vehicle with these ids; None if no entry matches. `name` is the name of its handle if that is new."""
@@ -278,7 +357,7 @@ class MavlinkRobotHW(RobotHW):
     def _find_deadline(self) -> None:
         """Set `deadline`."""
         first = min((tracked.moment.next for tracked in self._tracked.values()), default=math.inf)
-        self.deadline = -math.inf if self.dirty_vehicles else first
+        self.deadline = -math.inf if self.dirty_vehicles else min(first, self._expire_at)
 
     def _evaluate(self, tracked: TrackedVehicle, now: Instant) -> None:
         """Update the handle of a vehicle to `now`. Derive a new status only if its facts have changed."""
@@ -321,6 +400,14 @@ class MavlinkRobotHW(RobotHW):
             tracked.requests.restart(now.mono)
             self._asking.next_due = -math.inf
 
+    def _note_loss(self, tracked: TrackedVehicle) -> None:
+        """Its link is lost: it keeps its place if it was there long enough, else for a while."""
+        assert tracked.state is not None
+        since = tracked.state.heartbeats.since.mono
+        tracked.established = tracked.established or _last_heard(tracked) - since >= ESTABLISHED
+        if self._open and not tracked.established:
+            self._expire_at = min(self._expire_at, _last_heard(tracked) + self.options.heartbeat_timeout + GONE)
+
     def _log_link(self, tracked: TrackedVehicle, state: LinkState) -> None:
         before = tracked.handle.detail.link
         if state is before:
@@ -329,8 +416,28 @@ class MavlinkRobotHW(RobotHW):
         ids = tracked.ids or (0, 0)
         if state is LinkState.LOST and before is LinkState.CONNECTED:
             tracked.losses += 1
+            self._note_loss(tracked)
             log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, self.options.heartbeat_timeout)
         elif state is LinkState.CONNECTED and before is LinkState.LOST:
             log.info("vehicle %d.%d is back", *ids)
             if tracked.requests is not None:
-                tracked.requests.resume(tracked.handle.heard_at or 0.0)
+                tracked.requests.look_again(tracked.handle.heard_at or 0.0)
+
+
+def _last_heard(tracked: TrackedVehicle) -> float:
+    """When (monotonic seconds) a vehicle sent its last HEARTBEAT; -inf if it sent none."""
+    heard_at = tracked.handle.heard_at
+    return -math.inf if heard_at is None else heard_at
+
+
+def _make_unheard(tracked: TrackedVehicle) -> None:
+    """The state before the first HEARTBEAT. The ids stay."""
+    tracked.state, tracked.facts = None, ()
+    tracked.boots = 0
+    tracked.established = False
+    tracked.dirty, tracked.moment = False, Moment(-math.inf)
+    system, component = tracked.ids or (None, None)
+    tracked.handle.status = RobotStatus()
+    tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)
+    tracked.handle.heard_at = None
+    tracked.handle.evidence = {}

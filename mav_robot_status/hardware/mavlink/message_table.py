@@ -34,6 +34,7 @@ MOVES: Final[dict[type, tuple[str, ...]]] = {
     mav.GlobalPositionInt: ("movement",),
     mav.GpsRawInt: ("receiver_stands",),
     mav.Heartbeat: ("latched", "stop"),
+    mav.MessageInterval: (),
     mav.LocalPositionNed: ("movement",),
     mav.ParamValue: ("outputs", "outputs_vetoed", "stop_excused"),
     mav.ServoOutputRaw: ("outputs", "outputs_vetoed"),

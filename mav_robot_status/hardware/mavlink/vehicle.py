@@ -29,6 +29,7 @@ class TrackedVehicle:
     __slots__ = (
         "boots",
         "dirty",
+        "established",
         "facts",
         "handle",
         "ids",
@@ -49,6 +50,8 @@ class TrackedVehicle:
         self.requests: Requests | None = None
         self.parameters: Parameters | None = None
         self.boots = 0
+        self.established = False
+        """Whether its heartbeats arrived for a while. Otherwise its place is free again soon after it falls silent."""
         self.losses = 0
         """How often the link was lost."""
         self.facts: Facts | tuple[()] = ()
@@ -60,4 +63,8 @@ class TrackedVehicle:
 
     def matches(self, system: int, component: int) -> bool:
         """Whether this slot is free for an autopilot with these ids."""
-        return self.ids is None and self.slot.system in (None, system) and self.slot.component in (None, component)
+        return self.ids is None and self.accepts(system, component)
+
+    def accepts(self, system: int, component: int) -> bool:
+        """Whether an autopilot with these ids can have this slot, if it is free."""
+        return self.slot.system in (None, system) and self.slot.component in (None, component)

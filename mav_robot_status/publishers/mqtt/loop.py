@@ -48,6 +48,11 @@ class Loop:
         self._connections.append(connection)
         self._turned_at = float("-inf")
 
+    def remove(self, connection: Connection) -> None:
+        """Forget a connection that was closed."""
+        self.watch(connection)
+        self._connections.remove(connection)
+
     def wake(self) -> None:
         """Make `turn` return soon."""
         with contextlib.suppress(OSError):  # closed, or full of wake-ups

@@ -121,6 +121,17 @@ class MqttPublisher:
             self._statuses = {}
         return None
 
+    def forget(self, handle: str) -> None:
+        """End the connection of a handle that is gone. Its name is free for another robot."""
+        last = self._published.pop(handle, None)
+        if last is None or self._worker is None:
+            return
+        self._waiting = [(one, msg) for one, msg in self._waiting if one is not last]
+        self._statuses.pop(last.robot, None)
+        del self._names[last.robot]
+        self._published = {name: one for name, one in self._published.items() if one is not None}
+        self._worker.forget(last.robot)
+
     def close(self) -> None:
         """End the thread. Undelivered events wait on disk."""
         if self._worker:

@@ -56,6 +56,10 @@ class Worker:
         self._lost: Counter[str] = Counter()
         """Events of each robot that exceeded MOST_HANDED."""
         self._lines: Counter[str] = Counter()
+        self._gone: list[str] = []
+        """Robots that are gone since the thread looked."""
+        self._leaving: dict[str, Robot] = {}
+        """Robots whose last publications wait for the broker."""
         self.waiting = self.dropped = 0
         """Events that wait now, and events dropped since the spool was created. Other threads read both."""
         self._stop = False
@@ -81,6 +85,13 @@ class Worker:
             self._latest.update(statuses)
         self._loop.wake()
 
+    def forget(self, robot: str) -> None:
+        """Publish OFFLINE for a robot that is gone, and close its connection. Its waiting events stay on disk."""
+        with self._lock:
+            self._latest.pop(robot, None)
+            self._gone.append(robot)
+        self._loop.wake()
+
     def close(self) -> None:
         """Publish OFFLINE, write waiting events, end the thread."""
         self._stop = True
@@ -99,7 +110,7 @@ class Worker:
             log.exception("mqtt: the output has failed and is stopped; everything else continues")
         finally:
             now = self._clock()
-            for robot in self._robots.values():
+            for robot in (*self._robots.values(), *self._leaving.values()):
                 robot.connection.close()
             with contextlib.suppress(Exception):
                 self._spool.close(now.mono, now.unix_us / 1e6)
@@ -112,12 +123,14 @@ class Worker:
             latest, self._latest = self._latest, {}
             events, self._events = self._events, deque()
             lost, self._lost = self._lost, Counter()
+            gone, self._gone = self._gone, []
         for name, count in lost.items():
             self._spool.count_dropped(name, count)
         for event in events:
             self._spool.add(event)
         self._flush()
         self.waiting, self.dropped = self._spool.waiting, sum(self._spool.dropped.values())
+        self._let_go(gone)
         for name, msg in latest.items():
             self._robot(name).publish(line_of(msg, self._lines[name]))
             self._lines[name] += 1
@@ -126,6 +139,23 @@ class Worker:
             self._robot(name).pump(news=True)
         for name in fresh | latest.keys():
             self._loop.watch(self._robots[name].connection)
+
+    def _let_go(self, gone: list[str]) -> None:
+        """Publish OFFLINE for these robots; close the connections of those that have nothing left to say."""
+        for name in gone:
+            robot = self._robots.pop(name, None)
+            self._lines.pop(name, None)
+            if robot is not None:
+                robot.pump(news=True)
+                robot.leave(self._clock())
+                self._loop.watch(robot.connection)
+                self._leaving[name] = robot
+        for name, robot in list(self._leaving.items()):
+            if robot.settled:
+                robot.connection.leave()
+                robot.connection.close()
+                self._loop.remove(robot.connection)
+                del self._leaving[name]
 
     def _robot(self, name: str) -> Robot:
         robot = self._robots.get(name)

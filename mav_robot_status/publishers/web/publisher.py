@@ -48,6 +48,8 @@ class HttpPublisher:
             raise UsageError("http: the web page needs an extra: pip install 'mav-robot-status[web]'") from None
         self._explain = context.explain
         self._waiting: list[RobotStatusMsg] = []
+        self._gone: list[str] = []
+        """Handles that the server has to remove."""
         self._explanations: dict[str, Mapping[str, Any]] = {}
         self._explained: dict[str, float] = {}
         """When (monotonic seconds) each vehicle that a browser shows was explained."""
@@ -87,14 +89,19 @@ class HttpPublisher:
             self._scrapes.wanted = False
             self._server.give(self._metrics(now))
         again = self._explain_one(now)
-        if self._waiting or self._explanations:
-            if self._server.post(partial(_put, self._waiting, self._explanations)):
-                self._waiting, self._explanations = [], {}
+        if self._waiting or self._explanations or self._gone:
+            if self._server.post(partial(_put, self._waiting, self._explanations, self._gone)):
+                self._waiting, self._explanations, self._gone = [], {}, []
             elif len(self._waiting) > MOST_WAITING:
                 latest = list({msg.handle: msg for msg in self._waiting}.values())
                 self.dropped += len(self._waiting) - len(latest)
                 self._waiting = latest
-        return min(again, now.mono + RETRY) if self._waiting else again
+        return min(again, now.mono + RETRY) if self._waiting or self._gone else again
+
+    def forget(self, handle: str) -> None:
+        """Remove a handle that is gone from the page. The next message of a new handle of that name adds it again."""
+        self._waiting = [msg for msg in self._waiting if msg.handle != handle]
+        self._gone.append(handle)
 
     def close(self) -> None:
         """Stop the server."""
@@ -120,11 +127,14 @@ class HttpPublisher:
 def _put(
     messages: list[RobotStatusMsg],
     explanations: dict[str, Mapping[str, Any]],
+    gone: list[str],
     board: Board,
     events: Events,
     now: Instant,
 ) -> None:
     """Runs in the server's thread."""
+    for handle in gone:
+        board.forget(handle)
     for msg in messages:
         board.update(msg, now.mono)
     for handle, explanation in explanations.items():

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import math
 import mimetypes
 import threading
 from hashlib import sha256
@@ -35,6 +36,7 @@ quiet.setLevel(logging.CRITICAL)  # aiohttp logs each request that is not HTTP
 
 STANDING: Final = 5.0
 """Seconds without a round of the event loop after which the board's source counts as stalled."""
+LOG_PERIOD: Final = 60.0  # s between two log lines about connections that cannot be accepted
 KEEP_ALIVE: Final = 15.0  # s
 CLOSING: Final = 2.0  # s to wait for the thread to end
 SCHEMA: Final = "robot_status.schema.json"
@@ -59,6 +61,7 @@ class WebServer:
         self.turned: float | None = None
         """When (monotonic seconds) the event loop of the source last ran; None: not checked. Any thread may set it."""
         self._posted = False
+        self._log_at = -math.inf
         self._ready = threading.Event()
         self._loop: asyncio.AbstractEventLoop
         self._events: Events
@@ -114,6 +117,7 @@ class WebServer:
 
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
+        self._loop.set_exception_handler(self._failed)
         self._stop = asyncio.Event()
         self._events = Events(self.board, self._clock, self.standing, self._stale_after)
         app = web.Application(middlewares=[self._access.middleware()])
@@ -138,6 +142,17 @@ class WebServer:
             for listener in self._events.listeners:
                 listener.abort()
             await runner.cleanup()
+
+    def _failed(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Log a failure of the event loop. It reports each failed `accept` with a traceback, a hundred a second."""
+        error = context.get("exception")
+        if not isinstance(error, OSError):
+            loop.default_exception_handler(context)
+            return
+        now = self._clock().mono
+        if now >= self._log_at:
+            self._log_at = now + LOG_PERIOD
+            log.warning("%s: cannot accept another browser: %s", self.url, (error.strerror or str(error)).lower())
 
     def _add_routes(self, app: web.Application) -> None:
         for name, body in _assets().items():

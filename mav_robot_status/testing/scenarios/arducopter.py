@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..firmware import IN_AIR, LANDING, ON_GROUND, TAKEOFF
-from ..firmwares import ARDUCOPTER
+from ..firmwares import ARDUCOPTER, ARDUCOPTER_QUICK
 from ..scenario import RC_RECEIVER, Action, Scenario, Step, step
 
 _HEALTH = ARDUCOPTER.ready.sensors_health
@@ -107,5 +107,17 @@ LINK_SILENCE = _scenario(
     *_TAKE_OFF,
     step(10.0, "the link is cut", action=Action.SILENCE),
     step(16.0, "the link is back", action=Action.RESUME),
+)
+QUICK_REBOOT = Scenario(
+    "ready, and again at the first heartbeat after a reboot: only what is requested shows that it was one",
+    ARDUCOPTER_QUICK,
+    ARDUCOPTER_QUICK.ready,
+)
+LATE_STREAMS = Scenario(
+    "the streams of a ground station begin long after the first heartbeat",
+    ARDUCOPTER,
+    ARDUCOPTER.ready,
+    streams={1: 2.0, 30: 10.0, 33: 4.0, 74: 10.0, 193: 4.0, 36: 4.0},
+    streams_after=8.0,
 )
 REBOOT = _scenario("the autopilot reboots on the ground", step(4.0, "the autopilot reboots", action=Action.REBOOT))

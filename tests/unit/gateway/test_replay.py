@@ -13,7 +13,7 @@ from mav_robot_status.gateway.recorded_log import Recording
 from mav_robot_status.gateway.replay import ReplayPipeline, replay, run_through
 from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.links.log import Stamped
-from mav_robot_status.mavlink.definitions import Heartbeat, MessageInterval
+from mav_robot_status.mavlink.definitions import Heartbeat, NamedValueInt
 from mav_robot_status.mavlink.encode import encode
 
 START_US = 1_800_000_000_000_000
@@ -77,8 +77,8 @@ def test_a_new_segment_keeps_no_state_of_the_previous_one(tmp_path: Path, stdout
 
 
 def test_lines_continue_to_the_last_frame_even_if_it_is_ignored(tmp_path: Path, stdout: TextIO) -> None:
-    unwanted = encode(MessageInterval(0, 0), system=1, component=1, sequence=2)
-    assert 244 not in WANTED_IDS
+    unwanted = encode(NamedValueInt(0, 0, b""), system=1, component=1, sequence=2)
+    assert 252 not in WANTED_IDS
     path = Path(log_of(tmp_path / "a.tlog", 0, 1))
     path.write_bytes(path.read_bytes() + (START_US + 6_000_000).to_bytes(8, "big") + unwanted)
     lines = replayed(str(path), stdout)

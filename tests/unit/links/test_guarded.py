@@ -229,6 +229,6 @@ def test_a_link_that_raises_does_not_end_the_gateway(
     Faulty.fails = method
     for endpoint in hub.endpoints:
         hub.receive(endpoint, now)
-    hub.send_heartbeats((), now.mono)
+    hub.speak((), now.mono)
     hub.close()
     assert opened[0].closed == 1

@@ -40,7 +40,7 @@ DETAIL = Detail(
 )
 ROVER = RobotStatusMsg("rover", 0, STATUS, DETAIL, 0.25)
 UNHEARD = RobotStatusMsg("boat", 0, RobotStatus(), Detail(link=LinkState.NEVER_SEEN), None)
-LINK = ConnectionMetrics("udp:0.0.0.0:14550", False, 1, 100, 2, {0: 3, 74: 4}, 5, 6, 7, 8)
+LINK = ConnectionMetrics("udp:0.0.0.0:14550", False, 1, 100, 2, {0: 3, 74: 4}, 5, 6, 7, 8, 9, 10)
 OF_ROVER = 'handle="rover",system="1",component="1"'
 
 
@@ -105,6 +105,8 @@ def test_a_connection_counts_frames_and_errors() -> None:
         f"connection_incompatible_frames_total{{{of_link}}}": "6",
         f"connection_garbage_bytes_total{{{of_link}}}": "7",
         f"connection_dropped_total{{{of_link}}}": "8",
+        f"connection_unasked_bytes_total{{{of_link}}}": "9",
+        f"connection_held_back_total{{{of_link}}}": "10",
         f"connection_peers{{{of_link}}}": "1",
     }
 

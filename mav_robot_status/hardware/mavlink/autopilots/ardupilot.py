@@ -249,6 +249,9 @@ STREAMS: Final = {
 }
 """`GCS_MAVLINK_*::data_stream_send` of Copter 3.x."""
 
+BOOT_TEXTS: Final = frozenset({"ArduPilot Ready", "Initialising ArduPilot"})
+"""AP_Vehicle::setup and init_ardupilot send them, once in a run."""
+
 ARDUPILOT: Final = Autopilot(
     name="ArduPilot",
     recognition=Recognition(autopilots=frozenset({mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA}), lacks=None),
@@ -293,6 +296,7 @@ ARDUPILOT: Final = Autopilot(
         wanted=wanted.COMMON + wanted.ESTIMATOR,
         watched_families=frozenset({Family.COPTER, Family.ROVER, Family.PLANE, Family.SUB}),
         once=(wanted.VERSION,),
+        boot_texts=BOOT_TEXTS,
         streams=STREAMS,
     ),
 )

@@ -57,6 +57,10 @@ GENERIC: Final = Autopilot(
         reports_estimator=False,
     ),
     requests=Requests(
-        wanted=wanted.COMMON, watched_families=frozenset(), once=(wanted.VERSION, wanted.MODES), streams={}
+        wanted=wanted.COMMON,
+        watched_families=frozenset(),
+        once=(wanted.VERSION, wanted.MODES),
+        boot_texts=frozenset(),
+        streams={},
     ),
 )

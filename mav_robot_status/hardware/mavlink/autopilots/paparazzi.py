@@ -73,5 +73,5 @@ PAPARAZZI: Final[Autopilot] = replace(
         needs_healthy_estimator=False,
         reports_estimator=False,
     ),
-    requests=Requests(wanted=(), watched_families=frozenset(), once=(), streams={}),
+    requests=Requests(wanted=(), watched_families=frozenset(), once=(), boot_texts=frozenset(), streams={}),
 )

@@ -165,6 +165,8 @@ class Requests:
     """The families that also need OUTPUT_WATCH."""
     once: tuple[Once, ...]
     """The messages that are requested once: after the first heartbeat, and after a reboot."""
+    boot_texts: frozenset[str]
+    """The texts that it sends only while it starts."""
     streams: Mapping[int, int]
     """MAV_DATA_STREAM by message id, for firmware that does not know MAV_CMD_SET_MESSAGE_INTERVAL."""
 

@@ -176,6 +176,7 @@ PX4: Final = Autopilot(
         wanted=wanted.COMMON + wanted.CURRENT_MODE,
         watched_families=frozenset(),
         once=(wanted.VERSION, wanted.MODES),
+        boot_texts=frozenset(),
         streams={},
     ),
 )

@@ -42,6 +42,7 @@ HANDLERS: Final[dict[type, Handler]] = {
     mav.CurrentMode: modes.current_mode,
     mav.AvailableModes: modes.available_modes,
     mav.AutopilotVersion: modes.autopilot_version,
+    mav.MessageInterval: modes.message_interval,
 }
 
 

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
 LONG_LOSS: Final = 30.0
 """Seconds of link loss after which all latched state is invalid."""
+LONGEST_START: Final = 10.0
+"""Seconds from the first heartbeat to the text that ends the start."""
+TICKS: Final = 1.5
+"""Seconds within which a clock counts as running."""
 TURN: Final = 10.0
 """Seconds within which two autopilots with the same ids alternate."""
 
@@ -51,6 +55,10 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         seen.unsettled = True
         if _starts_anew(previous, message, state):
             rebooted(state, boot_rules.BootClock(now.mono), now)
+    if state.started_at is not None:
+        started, state.started_at = state.started_at, None
+        if _is_another_run(state, started):
+            rebooted(state, boot_rules.BootClock(started), now)
     if now.mono - last > LONG_LOSS:
         state.latches, state.stop = latches.NO_LATCHES, estop.NOTHING
         state.not_ready = state.failsafe = None
@@ -87,6 +95,17 @@ def _starts_anew(previous: Heartbeat, message: Heartbeat, state: VehicleState) -
         return True
     starting = state.profile.modes.initialising.get(state.family)
     return starting is not None and message.custom_mode == starting != previous.custom_mode
+
+
+def _is_another_run(state: VehicleState, started: float) -> bool:
+    """Whether a text that only a starting autopilot sends comes from another run than the one known.
+
+    A clock that still arrives decides itself. Without one, a run that is known for longer than a start takes has ended.
+    """
+    seen = state.latest
+    clocks = (seen.attitude, seen.global_position, seen.local_position)
+    ticks = any(clock is not None and started - clock.at < TICKS for clock in clocks)
+    return not ticks and started - state.boot.at > LONGEST_START
 
 
 def clock_changed(state: VehicleState, now: Instant) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from ....mavlink.decode import text
-from ....mavlink.definitions import AutopilotVersion, AvailableModes, CurrentMode
+from ....mavlink.definitions import AutopilotVersion, AvailableModes, CurrentMode, MessageInterval
 from ..autopilots import firmware
 from ..autopilots.modes import AvailableMode
 from ..state.latest_messages import heard
@@ -39,3 +39,7 @@ def autopilot_version(state: VehicleState, message: AutopilotVersion, now: Insta
     version = firmware.of_number(message.flight_sw_version)
     if version is not None:
         state.firmware = ToldFirmware(version, now.mono, f"AUTOPILOT_VERSION {version}")
+
+
+def message_interval(state: VehicleState, message: MessageInterval, now: Instant, options: HardwareOptions) -> None:
+    """MESSAGE_INTERVAL answers a request and says nothing about the vehicle."""

@@ -3,9 +3,13 @@
 An old ArduPilot does not know that command. It gets REQUEST_DATA_STREAM for the stream that contains the message, but
 only if no message of that stream arrives, because this sets the rate of the whole stream.
 
-A state machine of values and times, without a socket. It requests only messages that arrive at less than half the
-wanted rate 3 s after the first heartbeat: at most twice, 30 s apart, one command at a time. It never lowers, stops or
-resets a rate. Sources: MAVLink command protocol; `GCS_MAVLINK::set_message_interval` of ArduPilot; PX4
+A state machine of values and times, without a socket. It counts messages in windows of 3 s, and requests only those
+that arrive at less than half the wanted rate: at most twice, 30 s apart, one command at a time. The first window begins
+with the first message of a stream, and not while the autopilot starts. It begins again after a sign of a reboot: a link
+loss, a new connection, a text, or a message that has fallen silent while heartbeats arrive.
+
+It never lowers, stops or resets a rate: it asks first for the present interval, and never requests a lower rate than it
+has seen. Sources: MAVLink command protocol; `GCS_MAVLINK::set_message_interval` of ArduPilot; PX4
 `configure_streams`.
 """
 
@@ -18,7 +22,11 @@ from typing import TYPE_CHECKING, Final
 
 from ....mavlink import definitions as mav
 from ....mavlink import enumerations as mavlink
-from ....mavlink.enumerations import MAV_CMD_REQUEST_MESSAGE, MAV_CMD_SET_MESSAGE_INTERVAL
+from ....mavlink.enumerations import (
+    MAV_CMD_GET_MESSAGE_INTERVAL,
+    MAV_CMD_REQUEST_MESSAGE,
+    MAV_CMD_SET_MESSAGE_INTERVAL,
+)
 from ..autopilots.wanted import OUTPUT_WATCH, Once, Wanted
 
 if TYPE_CHECKING:
@@ -35,6 +43,19 @@ ROUNDS: Final = 2
 PATIENCE: Final = 1.0  # s for an acknowledgement
 PROGRESS: Final = 5.0  # s more after IN_PROGRESS, or until a retry after TEMPORARILY_REJECTED
 RETRIES: Final = 3
+ANSWER: Final = 0.3  # s from the acknowledgement of a question to its answer
+SILENT: Final = 3
+"""Windows of LOOK seconds without a message that arrived before: it has fallen silent."""
+LONGEST_BOOT: Final = 60.0  # s
+NO_STREAMS: Final = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
+        mavlink.MAVLINK_MSG_ID_PARAM_VALUE,
+        mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+    }
+)
+"""Messages that an autopilot sends without a stream."""
 BUDGET: Final = 700  # limit of all requested messages together, bytes per second
 
 
@@ -58,6 +79,11 @@ class _Command:
         self.tries = 0
         self.due = -math.inf
 
+    @property
+    def most_tries(self) -> int:
+        """A question that only saves a request is asked once."""
+        return 1 if self.command == MAV_CMD_GET_MESSAGE_INTERVAL else RETRIES + 1
+
 
 class Requests:
     """The requests to one autopilot. Call `arrived` for each of its messages, `acknowledged` for its COMMAND_ACKs."""
@@ -65,37 +91,84 @@ class Requests:
     def __init__(self, system: int, component: int, started: float) -> None:
         self._ids = (system, component)
         self._counts: dict[int, int] = {}
+        """The messages of this window."""
         self._queue: deque[_Command] = deque()
         self._refused: set[int] = set()
         self._silent: set[int] = set()
-        """Messages that did not arrive at all during a round."""
+        """Messages that did not arrive at all in the window before a round."""
+        self._empty: dict[int, int] = {}
+        """How many windows ago each message arrived last, since the rounds began."""
         self._streams: deque[tuple[int, int]] = deque()
         """Message id and rate in Hz of the streams to request."""
+        self._rates: dict[int, float] = {}
+        """The highest rate of each message so far, Hz: seen, or told by MESSAGE_INTERVAL."""
+        self._told: set[int] = set()
+        """Messages whose interval the autopilot has told in this round."""
+        self._tells = True
+        """Whether the autopilot answers MAV_CMD_GET_MESSAGE_INTERVAL, as far as known."""
         self._asked_once = False
+        self._begin(started)
+        self._began = started
+
+    def _begin(self, now: float) -> None:
+        """Begin the first window before the first round."""
+        if any(command.command == MAV_CMD_REQUEST_MESSAGE for command in self._queue):
+            self._asked_once = False
+        self._counts.clear()
+        self._empty.clear()
+        self._queue.clear()
+        self._refused.clear()
+        self._told.clear()
+        self._streams.clear()
+        self._streaming = False
+        """Whether a message other than HEARTBEAT has arrived."""
         self._round = 0
-        self._window = started
-        self._look_at = started + LOOK
+        self._began = self._window = self._round_at = now
+        self._look_at = now + LOOK
 
     def restart(self, now: float) -> None:
         """After a reboot of the autopilot all intervals are lost: start again."""
-        self._counts.clear()
-        self._queue.clear()
-        self._refused.clear()
-        self._streams.clear()
         self._asked_once = False
-        self._round, self._window, self._look_at = 0, now, now + LOOK
+        self._begin(now)
 
-    def resume(self, now: float) -> None:
-        """After a link loss: messages of that time do not count as missing. The rounds and their times stay."""
-        if self._look_at < math.inf:
+    def look_again(self, now: float) -> None:
+        """It may have rebooted: listen, and ask for what is missing then. What still arrives is not asked for."""
+        if self._round or now - self._window > LOOK:
+            self._begin(now)
+
+    def wait_for_boot(self, now: float) -> None:
+        """It is still starting: its streams begin later. Listen afterwards, at the latest after LONGEST_BOOT."""
+        if self._round == 0 and now - self._began < LONGEST_BOOT:
             self._counts.clear()
-            self._look_at = max(self._look_at, now + LOOK)
-            self._window = self._look_at - LOOK
+            self._streaming = False
+            self._window, self._look_at = now, now + LOOK
 
     def arrived(self, message_id: int, now: float) -> None:
-        """Count one message of this autopilot, during a round."""
-        if self._window <= now < self._look_at < math.inf:
-            self._counts[message_id] = self._counts.get(message_id, 0) + 1
+        """Count one message of this autopilot."""
+        try:
+            self._counts[message_id] += 1
+        except KeyError:
+            self._counts[message_id] = 1
+            if not self._streaming and message_id not in NO_STREAMS:
+                self._streaming = True
+                if self._round == 0:  # the others begin now too
+                    self._window, self._look_at = now, now + LOOK
+
+    def told(self, message_id: int, interval_us: int) -> None:
+        """MESSAGE_INTERVAL: the autopilot sends this message, or will. It is requested only if that is too slow."""
+        if interval_us <= 0:
+            return
+        rate = 1e6 / interval_us
+        self._rates[message_id] = max(rate, self._rates.get(message_id, 0.0))
+        if message_id not in self._told:
+            self._told.add(message_id)
+            self._queue = deque(c for c in self._queue if not _is_met(c, message_id, rate))
+
+    def outstanding(self) -> list[str]:
+        """What was asked for and was not answered yet, in words."""
+        if self._round == 0:
+            return ["its messages"]
+        return [command.what for command in self._queue]
 
     def acknowledged(self, ack: mav.CommandAck, own: tuple[int, int], now: float) -> None:
         """Process an acknowledgement. Ignore it if it is not for our outstanding command."""
@@ -107,6 +180,11 @@ class Requests:
         again = ack.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED and command.tries <= RETRIES
         if again or ack.result == mavlink.MAV_RESULT_IN_PROGRESS:
             command.due = now + PROGRESS
+        elif command.command == MAV_CMD_GET_MESSAGE_INTERVAL:
+            self._queue.popleft()
+            self._tells = ack.result == mavlink.MAV_RESULT_ACCEPTED
+            if self._queue:
+                self._queue[0].due = now + ANSWER if self._tells else -math.inf
         else:
             self._queue.popleft()
             if ack.result not in (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED):
@@ -132,10 +210,14 @@ class Requests:
                 return mav.RequestDataStream(rate, *self._ids, req_stream_id=stream, start_stop=1)
         while self._queue:
             command = self._queue[0]
+            if command.command == MAV_CMD_GET_MESSAGE_INTERVAL and not self._tells:
+                self._queue.popleft()
+                continue
             if now < command.due:
                 return None
-            if command.tries > RETRIES:
+            if command.tries >= command.most_tries:
                 self._queue.popleft()
+                self._tells = self._tells and command.command != MAV_CMD_GET_MESSAGE_INTERVAL
                 log.debug("%d.%d does not answer: %s", *self._ids, command.what)
                 continue
             command.tries += 1
@@ -152,25 +234,52 @@ class Requests:
         return min(self._look_at, self._queue[0].due if self._queue else math.inf)
 
     def _look(self, now: float, wanted: tuple[Wanted, ...], once: tuple[Once, ...]) -> None:
+        """The end of a window: ask in its turn, or because a message has fallen silent, for what is missing."""
+        self._note_rates(now)
+        if self._fell_silent(wanted):
+            counts = dict(self._counts)
+            self._begin(now)
+            self._counts = counts
+        if now >= self._round_at and self._round <= ROUNDS:
+            self._ask(now, wanted, once)
+        self._counts = {}
+        self._window, self._look_at = now, now + LOOK
+
+    def _note_rates(self, now: float) -> None:
+        seconds = max(LOOK, now - self._window)
+        for message_id, count in self._counts.items():
+            self._rates[message_id] = max(count / seconds, self._rates.get(message_id, 0.0))
+
+    def _fell_silent(self, wanted: tuple[Wanted, ...]) -> bool:
+        """Whether a wanted message that arrived since the rounds began has not arrived for SILENT windows."""
+        for w in wanted:
+            if self._came(w):
+                self._empty[w.id] = 0
+            elif w.id in self._empty:
+                self._empty[w.id] += 1
+        return any(number >= SILENT for number in self._empty.values())
+
+    def _ask(self, now: float, wanted: tuple[Wanted, ...], once: tuple[Once, ...]) -> None:
         """Compare the received messages with the wanted ones, and queue requests for the missing ones."""
         missing = [w for w in self._missing(wanted) if w.id not in self._refused]
         self._round += 1
+        self._round_at = now + AGAIN
         if self._round > ROUNDS:
-            self._look_at = math.inf
             if missing:
                 names = ", ".join(w.name for w in missing)
                 log.warning("vehicle %d.%d does not send %s although requested; continuing without", *self._ids, names)
             return
         for w in missing:
-            self._queue.append(_Command(MAV_CMD_SET_MESSAGE_INTERVAL, (w.id, round(1e6 / w.rate)), w.name))
+            rate = max(w.rate, self._rates.get(w.id, 0.0))
+            if self._round == 1 and self._tells:
+                self._queue.append(_Command(MAV_CMD_GET_MESSAGE_INTERVAL, (w.id, 0.0), f"the interval of {w.name}"))
+            self._queue.append(_Command(MAV_CMD_SET_MESSAGE_INTERVAL, (w.id, round(1e6 / rate)), w.name))
         if not self._asked_once:
             self._asked_once = True
             self._queue.extend(_Command(MAV_CMD_REQUEST_MESSAGE, (o.id, 0.0), o.name, o.older) for o in once)
         if missing:
             log.info("requesting from vehicle %d.%d: %s", *self._ids, ", ".join(w.name for w in missing))
         self._silent = {w.id for w in wanted if not self._came(w)}
-        self._counts.clear()
-        self._window, self._look_at = now + AGAIN - LOOK, now + AGAIN
 
     def _missing(self, wanted: tuple[Wanted, ...]) -> Iterator[Wanted]:
         return (w for w in wanted if self._came(w) / LOOK < w.rate / 2)
@@ -182,3 +291,9 @@ class Requests:
         """SET_MESSAGE_INTERVAL is unknown there: request the whole stream, if none of its messages arrives."""
         if message_id in self._silent:
             self._streams.append((int(message_id), math.ceil(1e6 / interval_us)))
+
+
+def _is_met(command: _Command, message_id: int, rate: float) -> bool:
+    """Whether a request that was not sent yet is unnecessary, because its message comes at least at half its rate."""
+    wanted = command.command == MAV_CMD_SET_MESSAGE_INTERVAL and command.params[0] == message_id
+    return wanted and command.tries == 0 and rate >= 1e6 / command.params[1] / 2

@@ -34,6 +34,10 @@ class Parameters:
         """Note a value that arrived: it need not be requested."""
         self._missing.pop(name, None)
 
+    def outstanding(self) -> list[str]:
+        """The names that may still be answered."""
+        return [] if self._due == math.inf else list(self._missing)
+
     def due(self, now: float) -> mav.ParamRequestRead | None:
         """The request to send at `now`, if any."""
         if now < self._due:

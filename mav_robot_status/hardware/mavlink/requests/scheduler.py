@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ....interface import LinkState
+from ....mavlink import definitions as mav
 from ....mavlink.decode import text
-from ....mavlink.definitions import CommandAck, ParamValue
+from ....mavlink.definitions import CommandAck, MessageInterval, ParamValue, Statustext
+from ....mavlink.enumerations import MAV_STATE_BOOT, MAV_STATE_CALIBRATING, MAV_STATE_UNINIT
+from ..autopilots.profile import Uninit
 from ..autopilots.wanted import OUTPUT_WATCH
 from .message_intervals import Requests, wanted_of
 from .parameters import Parameters
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Mapping
+    from collections.abc import Callable, Container, Mapping
 
+    from ..state.vehicle_state import VehicleState
     from ..vehicle import TrackedVehicle
+
+ROOM: Final = 0.5  # s until a vehicle is looked at again whose link has no room
+ANSWERS: Final = frozenset(
+    d.id for d in mav.MESSAGES.values() if d.type in (CommandAck, MessageInterval, ParamValue, Statustext)
+)
+"""The messages that say something about a request."""
 
 
 class Ask(NamedTuple):
@@ -44,26 +54,57 @@ class RequestScheduler:
         if requests is None:
             return
         requests.arrived(message_id, now)
+        if message_id in ANSWERS:
+            self._answered(requests, tracked, message, now)
+
+    def _answered(self, requests: Requests, tracked: TrackedVehicle, message: Any, now: float) -> None:
         if type(message) is CommandAck and tracked.ids is not None:
             requests.acknowledged(message, (self.own_system or tracked.ids[0], self.own_component), now)
             self.next_due = -math.inf
         elif type(message) is ParamValue and tracked.parameters is not None:
             tracked.parameters.heard(text(message.param_id))
+        elif type(message) is MessageInterval:
+            requests.told(message.message_id, message.interval_us)
+        elif (
+            type(message) is Statustext
+            and tracked.state is not None
+            and text(message.text) in tracked.state.profile.requests.boot_texts
+        ):
+            requests.look_again(now)
+            self.next_due = -math.inf
+
+    def waits_for(self, tracked: TrackedVehicle) -> str | None:
+        """What this vehicle was asked for and has not sent yet, in words; None if nothing is outstanding."""
+        if tracked.ids is None or tracked.state is None or tracked.handle.detail.link is not LinkState.CONNECTED:
+            return None
+        requests, parameters = tracked.requests, tracked.parameters
+        waiting = [] if requests is None else requests.outstanding()
+        if parameters is not None and (names := parameters.outstanding()):
+            waiting.append(f"{len(names)} parameters from {names[0]} on")
+        return "vehicle {}.{}: {}".format(*tracked.ids, ", ".join(waiting)) if waiting else None
 
     def due(
-        self, vehicles: Mapping[tuple[int, int], TrackedVehicle], now: float, passive: Container[tuple[int, int]]
+        self,
+        vehicles: Mapping[tuple[int, int], TrackedVehicle],
+        now: float,
+        passive: Container[tuple[int, int]],
+        has_room: Callable[[tuple[int, int], int], bool] = lambda ids, number: True,
     ) -> list[Ask]:
-        """The requests to send at `now`, none to vehicles on `passive` links."""
+        """The requests to send at `now`, none to vehicles on `passive` links, nor where there is no room for more."""
         if now < self.next_due and passive == self._passive:
             return []
         self._passive = passive
         self.next_due = math.inf
         asks: list[Ask] = []
         for ids, tracked in vehicles.items():
-            if ids not in passive and tracked.handle.detail.link is LinkState.CONNECTED:
-                message = self._of(ids, tracked, now)
-                if message is not None:
-                    asks.append(Ask(*ids, message))
+            if ids in passive or tracked.handle.detail.link is not LinkState.CONNECTED:
+                continue
+            if not has_room(ids, len(asks)):
+                self.next_due = min(self.next_due, now + ROOM)
+                continue
+            message = self._of(ids, tracked, now)
+            if message is not None:
+                asks.append(Ask(*ids, message))
         if asks:  # another may follow at once
             self.next_due = -math.inf
         return asks
@@ -75,7 +116,13 @@ class RequestScheduler:
             return None
         if tracked.requests is None:
             tracked.requests = Requests(*ids, now)
+        if now >= tracked.requests.next_due() and not _has_stayed(state):
+            self.next_due = min(self.next_due, now + ROOM)
+            return None
         wanted = wanted_of(state.profile, state.family, self._watch_outputs)
+        beat = state.latest.heartbeat
+        if beat is not None and is_booting(state, beat.message):
+            tracked.requests.wait_for_boot(now)
         message: Any = tracked.requests.due(now, wanted, state.profile)
         if message is None and OUTPUT_WATCH[0] in wanted:
             if tracked.parameters is None:
@@ -84,3 +131,17 @@ class RequestScheduler:
             self.next_due = min(self.next_due, tracked.parameters.next_due())
         self.next_due = min(self.next_due, tracked.requests.next_due())
         return message
+
+
+def is_booting(state: VehicleState, beat: mav.Heartbeat) -> bool:
+    """Whether an autopilot is still starting: its streams do not run yet."""
+    if beat.system_status == MAV_STATE_UNINIT:
+        return state.profile.states.uninit is Uninit.STARTING
+    if beat.system_status in (MAV_STATE_BOOT, MAV_STATE_CALIBRATING):
+        return True
+    return state.profile.modes.initialising.get(state.family) == beat.custom_mode
+
+
+def _has_stayed(state: VehicleState) -> bool:
+    """Whether it sent more than one HEARTBEAT: nothing is asked of an id that was heard once."""
+    return state.heartbeats.runs[-1].last > state.heartbeats.since.mono

@@ -90,6 +90,8 @@ class VehicleState:
     """The sequence number of the latest EVENT."""
     boots: int = 0
     """Reboots seen."""
+    started_at: float | None = None
+    """When the autopilot sent a text that it sends only while it starts, since the last heartbeat."""
     formerly: tuple[int, int] | None = None
     """The autopilot and vehicle type that used these ids before."""
 

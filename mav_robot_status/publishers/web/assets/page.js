@@ -57,6 +57,8 @@ const on = {
       else page.vehicles.set(line.handle, new Vehicle(line));
     }
     for (const [handle, beat] of Object.entries(data.beats ?? {})) page.vehicles.get(handle)?.heartbeat(...beat);
+    // `beats` names every vehicle that the gateway has
+    if (data.beats) for (const handle of [...page.vehicles.keys()]) if (!(handle in data.beats)) page.vehicles.delete(handle);
     return render();
   },
   lost() {

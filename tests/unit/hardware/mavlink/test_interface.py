@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from mav_robot_status.hardware.mavlink.interface import MOST_VEHICLES, MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.interface import ESTABLISHED, MOST_VEHICLES, MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.vehicle import ExpectedVehicle
 from mav_robot_status.interface import LinkState, RobotStatus, TriState
@@ -76,9 +76,10 @@ def test_only_autopilot_heartbeats_are_returned_to_the_caller() -> None:
 def test_nothing_is_due_before_the_first_message_and_after_the_loss() -> None:
     hw = MavlinkRobotHW()
     assert hw.next_due() == math.inf
-    flight = copter(streams=False).hb()
+    flight = copter(streams=False).stream("heartbeat", lambda: BEAT)
+    flight.wait(ESTABLISHED + 1)
     assert flight.hw.next_due() <= flight.clock.now().mono + 3.5001
-    flight.wait(5)
+    flight.stop().wait(5)
     assert flight.detail.link is LinkState.LOST
     assert flight.hw.next_due() == math.inf
 
@@ -111,7 +112,8 @@ def test_a_loss_and_a_return_are_one_log_line_each(caplog: pytest.LogCaptureFixt
 
 def test_a_lost_link_is_an_error_only_if_configured_and_keeps_its_start_time() -> None:
     flight = copter(options=HardwareOptions(link_loss_is_error=True))
-    flight.hb().stop().wait(4)
+    flight.hb().wait(ESTABLISHED + 1)
+    flight.stop().wait(4)
     assert flight.status == RobotStatus(in_error=TriState.TRUE, error_code=9001)
     since = flight.detail.errors[0].since_us
     flight.text("still talking", 6).wait(10)
@@ -187,3 +189,67 @@ def test_a_mavlink_1_frame_is_handled_like_a_mavlink_2_frame() -> None:
     flight.hw.take(frame, flight.clock.now())
     flight.look()
     assert flight.status.drives_powered is TriState.TRUE
+
+
+def beats(hw: MavlinkRobotHW, clock: ManualClock, seconds: float, *ids: tuple[int, int]) -> None:
+    """Heartbeats of these vehicles once a second; at the end a `read`."""
+    for _ in range(round(seconds)):
+        for one in ids:
+            hw.take(frame_of(BEAT, one), clock.now())
+        hw.read(clock.now())
+        clock.advance(1.0)
+    hw.read(clock.now())
+
+
+def test_a_vehicle_heard_briefly_gives_up_its_place_and_its_handle() -> None:
+    hw, clock = MavlinkRobotHW(), ManualClock()
+    beats(hw, clock, 3, (7, 1))
+    handle = hw.handles.get_handle(NAME)
+    clock.advance(5)
+    hw.read(clock.now())
+    assert handle.detail.link is LinkState.LOST
+    assert hw.next_due() <= clock.now().mono + 10
+    clock.advance(10)
+    hw.read(clock.now())
+    assert hw.handles.get_names() == []
+    assert (handle.status, handle.detail.link) == (RobotStatus(), LinkState.NEVER_SEEN)
+    assert hw.next_due() == math.inf
+    beats(hw, clock, 1, (8, 1))
+    assert hw.handles.get_names() == [NAME]
+
+
+def test_a_vehicle_that_was_there_stays_as_lost() -> None:
+    hw, clock = MavlinkRobotHW(), ManualClock()
+    beats(hw, clock, ESTABLISHED + 2, (7, 1))
+    clock.advance(1000)
+    hw.read(clock.now())
+    assert hw.handles.get_handle(NAME).detail.link is LinkState.LOST
+
+
+def test_a_new_vehicle_gets_the_place_of_the_one_that_is_silent_longest() -> None:
+    hw, clock = MavlinkRobotHW(), ManualClock()
+    ghosts = [(n % 250 + 2, n // 250 + 1) for n in range(MOST_VEHICLES)]
+    beats(hw, clock, 1, *ghosts)
+    beats(hw, clock, 8, *ghosts[1:], (1, 1))
+    assert hw.find(*ghosts[0]) is None
+    assert hw.find(1, 1) is not None
+    assert len(list(hw.vehicles)) == MOST_VEHICLES
+
+
+def test_the_open_entry_of_a_vehicle_heard_briefly_is_free_for_another() -> None:
+    hw, clock = MavlinkRobotHW(slots=[ExpectedVehicle(handle="crane")]), ManualClock()
+    beats(hw, clock, 2, (7, 1))
+    clock.advance(60)
+    hw.read(clock.now())
+    assert hw.handles.get_handle("crane").detail.link is LinkState.LOST
+    beats(hw, clock, 5, (1, 1))
+    assert hw.handles.get_handle("crane").detail.system == 1
+
+
+def test_the_open_entry_of_a_vehicle_that_was_there_is_nobody_elses() -> None:
+    hw, clock = MavlinkRobotHW(slots=[ExpectedVehicle(handle="crane")]), ManualClock()
+    beats(hw, clock, ESTABLISHED + 2, (7, 1))
+    clock.advance(60)
+    hw.read(clock.now())
+    beats(hw, clock, 5, (1, 1))
+    assert hw.handles.get_handle("crane").detail.system == 7

@@ -11,6 +11,7 @@ from mav_robot_status.hardware.mavlink.identity import Family
 from mav_robot_status.hardware.mavlink.requests.message_intervals import BUDGET, Requests, wanted_of
 from mav_robot_status.mavlink.definitions import CommandAck, CommandLong, RequestDataStream
 from mav_robot_status.mavlink.enumerations import (
+    MAV_CMD_GET_MESSAGE_INTERVAL,
     MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
     MAV_CMD_REQUEST_MESSAGE,
     MAV_CMD_SET_MESSAGE_INTERVAL,
@@ -23,6 +24,7 @@ from mav_robot_status.mavlink.enumerations import (
 )
 
 US = (1, 192)
+GET = MAV_CMD_GET_MESSAGE_INTERVAL
 FAILED = 4
 ONE = (Wanted(1, "SYS_STATUS", 1.0, 55),)
 ONLY_RATES = replace(ARDUPILOT, requests=replace(ARDUPILOT.requests, once=()))
@@ -37,8 +39,19 @@ def ack(
 
 
 def asked(requests: Requests, now: float, wanted: tuple[Wanted, ...] = ONE, modes: bool = False) -> CommandLong | None:
-    command = requests.due(now, wanted, PX4 if modes else ONLY_RATES)
+    """The next request to an autopilot that does not tell its intervals."""
+    command = due(requests, now, wanted, PX4 if modes else ONLY_RATES)
     assert not isinstance(command, RequestDataStream)
+    return command
+
+
+def due(
+    requests: Requests, now: float, wanted: tuple[Wanted, ...], profile: Autopilot
+) -> CommandLong | RequestDataStream | None:
+    command = requests.due(now, wanted, profile)
+    if isinstance(command, CommandLong) and command.command == GET:
+        requests.acknowledged(ack(MAV_RESULT_UNSUPPORTED, GET), US, now)
+        command = requests.due(now, wanted, profile)
     return command
 
 
@@ -72,7 +85,7 @@ def test_a_missing_message_is_requested_with_its_interval(requests: Requests) ->
 def test_half_the_wanted_rate_is_enough(requests: Requests, count: int, expected: list[int]) -> None:
     for number in range(count):
         requests.arrived(1, 100.5 + number)
-    assert answered(requests, 103.0) == expected
+    assert answered(requests, 103.5) == expected
 
 
 def test_a_late_event_loop_does_not_reduce_the_measured_rates(requests: Requests) -> None:
@@ -84,7 +97,7 @@ def test_a_late_event_loop_does_not_reduce_the_measured_rates(requests: Requests
 def test_an_alternative_message_is_sufficient(requests: Requests) -> None:
     for number in range(6):
         requests.arrived(32, 100.2 + number * 0.3)
-    assert answered(requests, 103.0, TWO) == [1]
+    assert answered(requests, 103.2, TWO) == [1]
 
 
 def test_one_command_is_outstanding_at_a_time(requests: Requests) -> None:
@@ -100,7 +113,7 @@ def test_one_command_is_outstanding_at_a_time(requests: Requests) -> None:
 def test_a_command_without_an_answer_is_sent_four_times(requests: Requests) -> None:
     sent = [asked(requests, 103.0 + second) for second in range(6)]
     assert [c.confirmation if c else None for c in sent] == [0, 1, 2, 3, None, None]
-    assert requests.next_due() == 133.0
+    assert requests.next_due() == 109.0
 
 
 @pytest.mark.parametrize("foreign", [ack(command=400), ack(to=(1, 191)), ack(to=(255, 190))])
@@ -137,7 +150,7 @@ def test_a_refusal_is_final(requests: Requests) -> None:
 
 def refused(requests: Requests, result: int, profile: Autopilot, wanted: tuple[Wanted, ...] = ONE) -> object:
     """The requests after a refusal of the command for the first message."""
-    assert requests.due(103.0, wanted, profile) is not None
+    assert due(requests, 103.0, wanted, profile) is not None
     requests.acknowledged(ack(result), US, 103.1)
     return requests.due(103.1, wanted, profile)
 
@@ -146,12 +159,12 @@ def test_an_old_ardupilot_without_the_command_gets_a_stream_request(requests: Re
     four_hz = (Wanted(30, "ATTITUDE", 4.0, 40),)
     assert refused(requests, MAV_RESULT_UNSUPPORTED, ONLY_RATES, four_hz) == RequestDataStream(4, 1, 1, 10, 1)
     assert requests.due(103.2, four_hz, ONLY_RATES) is None
-    assert requests.next_due() == 133.0
+    assert requests.next_due() == 106.0
 
 
 def test_the_rate_of_an_active_stream_is_not_changed() -> None:
     requests = Requests(1, 1, 100.0)
-    requests.arrived(30, 101.0)
+    requests.arrived(30, 100.0)
     four_hz = (Wanted(30, "ATTITUDE", 4.0, 40),)
     assert refused(requests, MAV_RESULT_UNSUPPORTED, ONLY_RATES, four_hz) is None
 
@@ -165,10 +178,9 @@ def test_a_missing_message_is_requested_twice_30_s_apart_and_then_accepted_as_mi
     requests: Requests, caplog: pytest.LogCaptureFixture
 ) -> None:
     assert answered(requests, 103.0) == [1]
-    assert answered(requests, 132.9) == []
+    assert answered(requests, 129.9) == []
     assert answered(requests, 133.0) == [1]
     assert answered(requests, 163.0) == []
-    assert requests.next_due() == float("inf")
     assert answered(requests, 1000.0) == []
     (told,) = [r.message for r in caplog.records if r.levelno == logging.WARNING]
     assert told == "vehicle 1.1 does not send SYS_STATUS although requested; continuing without"
@@ -191,21 +203,120 @@ def test_all_requests_restart_after_a_reboot(requests: Requests) -> None:
 
 def test_messages_absent_during_a_lost_link_are_not_missing(requests: Requests) -> None:
     assert answered(requests, 103.0) == [1]
-    requests.resume(132.0)  # the link was lost until now
+    requests.look_again(132.0)  # the link was lost until now
     for number in range(4):
         requests.arrived(1, 132.1 + number)
     assert answered(requests, 134.9) == []
-    assert answered(requests, 135.0) == []
+    assert answered(requests, 135.2) == []
 
 
-def test_a_flapping_link_does_not_cause_more_requests(requests: Requests) -> None:
+def test_after_a_sign_of_a_reboot_it_asks_again_for_what_is_missing(requests: Requests) -> None:
     assert answered(requests, 103.0) == [1]
-    for second in range(105, 120):
-        requests.resume(float(second))
-    assert answered(requests, 132.9) == []
-    assert answered(requests, 133.0) == [1]
-    requests.resume(170.0)
-    assert [answered(requests, float(t)) for t in (173, 200, 400)] == [[], [], []]
+    requests.look_again(140.0)
+    assert answered(requests, 142.9) == []
+    assert answered(requests, 143.0) == [1]
+
+
+def test_signs_in_quick_succession_do_not_postpone_the_requests(requests: Requests) -> None:
+    assert answered(requests, 103.0) == [1]
+    for second in (140.0, 141.0, 142.5):
+        requests.look_again(second)
+    assert answered(requests, 143.0) == [1]
+
+
+def windows(requests: Requests, first: float, last: float) -> dict[float, list[int]]:
+    """What is requested at the end of each window."""
+    found = {}
+    now = first
+    while now < last:
+        now += 3.0
+        if ids := answered(requests, now):
+            found[now] = ids
+    return found
+
+
+def test_a_message_that_falls_silent_is_requested_again(requests: Requests) -> None:
+    assert answered(requests, 103.0) == [1]
+    for second in range(104, 200):
+        requests.arrived(1, float(second))
+        answered(requests, float(second))
+    assert list(windows(requests, 199.0, 240.0)) == [pytest.approx(210.0, abs=3.0), pytest.approx(240.0, abs=3.0)]
+    assert windows(requests, 240.0, 400.0) == {}
+
+
+def test_a_message_that_never_arrived_does_not_fall_silent(requests: Requests) -> None:
+    assert answered(requests, 103.0) == [1]
+    assert list(windows(requests, 103.0, 400.0)) == [133.0]
+
+
+def test_nothing_is_requested_while_the_autopilot_starts(requests: Requests) -> None:
+    for tenth in range(80):
+        requests.wait_for_boot(100.0 + tenth / 10)
+        assert answered(requests, 100.0 + tenth / 10) == []
+    assert answered(requests, 110.9) == [1]
+
+
+def test_an_autopilot_that_never_ends_its_start_is_asked_all_the_same(requests: Requests) -> None:
+    for second in range(60):
+        requests.wait_for_boot(100.0 + second)
+    requests.wait_for_boot(170.0)
+    assert answered(requests, 170.0) == [1]
+
+
+def test_the_first_window_begins_with_the_first_message_of_a_stream(requests: Requests) -> None:
+    requests.arrived(253, 101.0)  # a text is no stream
+    requests.arrived(1, 102.9)
+    requests.arrived(1, 103.9)
+    assert answered(requests, 103.0) == []
+    assert answered(requests, 105.9) == []
+
+
+FOUR_HZ = (Wanted(30, "ATTITUDE", 4.0, 40),)
+
+
+def first_question(requests: Requests) -> None:
+    question = requests.due(103.0, FOUR_HZ, ONLY_RATES)
+    assert isinstance(question, CommandLong)
+    assert (question.command, question.param1) == (GET, 30)
+
+
+@pytest.mark.parametrize(
+    ("interval_us", "requested"), [(100_000, None), (500_000, None), (1_000_000, 250_000), (-1, 250_000)]
+)
+def test_a_message_that_will_come_fast_enough_is_not_requested(
+    requests: Requests, interval_us: int, requested: int | None
+) -> None:
+    first_question(requests)
+    requests.told(30, interval_us)
+    requests.acknowledged(ack(command=GET), US, 103.1)
+    command = requests.due(103.5, FOUR_HZ, ONLY_RATES)
+    assert (command.param2 if isinstance(command, CommandLong) else None) == requested
+
+
+def test_the_answer_to_a_question_may_follow_its_acknowledgement(requests: Requests) -> None:
+    first_question(requests)
+    requests.acknowledged(ack(command=GET), US, 103.1)
+    assert requests.due(103.2, FOUR_HZ, ONLY_RATES) is None
+    requests.told(30, 100_000)
+    assert requests.due(103.5, FOUR_HZ, ONLY_RATES) is None
+
+
+def test_an_unanswered_question_is_not_repeated(requests: Requests) -> None:
+    first_question(requests)
+    assert requests.due(103.9, FOUR_HZ, ONLY_RATES) is None
+    command = requests.due(104.0, FOUR_HZ, ONLY_RATES)
+    assert isinstance(command, CommandLong)
+    assert command.command == MAV_CMD_SET_MESSAGE_INTERVAL
+
+
+def test_no_rate_below_the_one_seen_before_is_requested(requests: Requests) -> None:
+    for number in range(31):
+        requests.arrived(30, 100.0 + number / 10)
+    assert requests.due(103.0, FOUR_HZ, ONLY_RATES) is None
+    requests.restart(120.0)
+    command = due(requests, 123.0, FOUR_HZ, ONLY_RATES)
+    assert isinstance(command, CommandLong)
+    assert command.param2 == pytest.approx(100_000, rel=0.05)
 
 
 def test_version_and_modes_are_requested_once(requests: Requests) -> None:

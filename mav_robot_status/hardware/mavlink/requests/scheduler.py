@@ -18,7 +18,6 @@ from .parameters import Parameters
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Mapping
 
-    from ..state.vehicle_state import VehicleState
     from ..vehicle import TrackedVehicle
 
 ROOM: Final = 0.5  # s until a vehicle is looked at again whose link has no room
@@ -116,12 +115,11 @@ class RequestScheduler:
             return None
         if tracked.requests is None:
             tracked.requests = Requests(*ids, now)
-        if now >= tracked.requests.next_due() and not _has_stayed(state):
+        if now >= tracked.requests.next_due() and not _has_stayed(tracked):
             self.next_due = min(self.next_due, now + ROOM)
             return None
         wanted = wanted_of(state.profile, state.family, self._watch_outputs)
-        beat = state.latest.heartbeat
-        if beat is not None and is_booting(state, beat.message):
+        if is_booting(tracked):
             tracked.requests.wait_for_boot(now)
         message: Any = tracked.requests.due(now, wanted, state.profile)
         if message is None and OUTPUT_WATCH[0] in wanted:
@@ -133,8 +131,12 @@ class RequestScheduler:
         return message
 
 
-def is_booting(state: VehicleState, beat: mav.Heartbeat) -> bool:
+def is_booting(tracked: TrackedVehicle) -> bool:
     """Whether an autopilot is still starting: its streams do not run yet."""
+    state = tracked.state
+    if state is None or state.latest.heartbeat is None:
+        return False
+    beat = state.latest.heartbeat.message
     if beat.system_status == MAV_STATE_UNINIT:
         return state.profile.states.uninit is Uninit.STARTING
     if beat.system_status in (MAV_STATE_BOOT, MAV_STATE_CALIBRATING):
@@ -142,6 +144,7 @@ def is_booting(state: VehicleState, beat: mav.Heartbeat) -> bool:
     return state.profile.modes.initialising.get(state.family) == beat.custom_mode
 
 
-def _has_stayed(state: VehicleState) -> bool:
+def _has_stayed(tracked: TrackedVehicle) -> bool:
     """Whether it sent more than one HEARTBEAT: nothing is asked of an id that was heard once."""
-    return state.heartbeats.runs[-1].last > state.heartbeats.since.mono
+    heartbeats = None if tracked.state is None else tracked.state.heartbeats
+    return heartbeats is not None and heartbeats.runs[-1].last > heartbeats.since.mono

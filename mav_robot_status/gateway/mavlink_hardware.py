@@ -112,9 +112,9 @@ class MavlinkHardware:
     def write(self, now: Instant) -> None:
         """Send the due requests and heartbeats."""
         if self.vehicles.asks:
-            # the autopilot acknowledges to these ids
-            self.vehicles.speak_as(self._config.identity.system, self.hub.sender.component.id)
             for ask in self.vehicles.due_requests(now, self.hub.passive_vehicles(), self.hub.may_ask):
+                # the autopilot acknowledges to these ids
+                self.vehicles.speak_as(self._config.identity.system, self.hub.sender.component.id)
                 self.hub.ask(ask)
         if self.hub.sender.signing_policy is not None:
             self.hub.sender.signing_policy.keep()

@@ -10,6 +10,8 @@ import threading
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
 
 import pytest
 
@@ -184,9 +186,13 @@ def test_an_out_gets_every_status_of_a_fleet(gateway: Callable[..., Gateway], wi
     """An out is an order to send: it has no bound of its own."""
     station = wire()
     gate = gateway("udpin:127.0.0.1:0", "--json", "none", "--out", f"udpout:127.0.0.1:{station.address[1]}")
-    robots = [wire(gate.address, system=number + 1).beating() for number in range(8)]
-    for number in range(len(robots)):
-        station.wait_for("ROBOT_STATUS", lambda m, n=number: m.subject_system == n + 1, count=3)
+    for number in range(8):
+        wire(gate.address, system=number + 1).beating()
+        station.wait_for("ROBOT_STATUS", partial(is_about, number + 1), count=3)
+
+
+def is_about(system: int, message: Any) -> bool:
+    return bool(message.subject_system == system)
 
 
 def test_idle_clients_do_not_lock_a_vehicle_out_of_a_server(gateway: Callable[..., Gateway]) -> None:

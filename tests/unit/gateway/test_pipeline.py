@@ -18,7 +18,7 @@ from mav_robot_status.gateway.controller_config import DEFAULT_CONTROLLER, check
 from mav_robot_status.gateway.mavlink_hardware import robot_hw
 from mav_robot_status.gateway.pipeline import Pipeline
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.interface import Audience
+from mav_robot_status.interface import Audience, LinkState
 from mav_robot_status.mavlink.definitions import Heartbeat
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.framing import Frame, Parser
@@ -266,3 +266,19 @@ def test_statuses_are_also_sent_over_mavlink(stdout: TextIO) -> None:
 def test_a_standard_output_without_a_descriptor_is_an_error() -> None:
     with pytest.raises(ConfigError, match="publisher 'json' cannot be made"):
         made(Config(), Port(HEARER), io.StringIO())
+
+
+def test_a_removed_handle_has_a_last_line_and_its_controller_ends(stdout: TextIO) -> None:
+    pipeline = made(Config(), Port(), stdout)
+    take(pipeline, heartbeat(7), START)
+    take(pipeline, heartbeat(8), START)
+    pipeline.tick(START)
+    handles = pipeline.hw.handles
+    gone = handles.get_handle(f"{NAME}/8.1")
+    gone.detail = gone.detail._replace(link=LinkState.NEVER_SEEN)
+    handles.remove_handle(gone.name)
+    pipeline.tick(later(START, 1.0))
+    pipeline.tick(later(START, 2.0))
+    found = [line for line in lines(stdout) if line["handle"] == gone.name]
+    assert found[-1]["link"]["state"] == "NEVER_SEEN"
+    assert found[-1]["stamp"] < lines(stdout)[-1]["stamp"]

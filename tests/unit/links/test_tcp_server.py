@@ -172,3 +172,21 @@ def test_without_free_descriptors_the_server_neither_fails_nor_spins(
         assert caplog.messages == [f"{link.text}: cannot accept another client: too many open files"]
         client.send(b"at last")
         assert LinkDriver(link).received(7) == b"at last"
+
+
+def test_a_client_without_valid_frames_gives_way_to_a_new_one(
+    link: TcpServerLink, connect: Connect, caplog: pytest.LogCaptureFixture
+) -> None:
+    clients = [connect() for _ in range(MAX_CLIENTS)]
+    active: list[object] = []
+    link.is_active = active.__contains__
+    for client in clients[:-1]:
+        client.sendall(b"x")
+        assert readable(link.fileno())
+        active += [piece.source for piece in link.receive()]
+    newest = connect()
+    newest.sendall(b"new")
+    assert readable(link.fileno())
+    assert [piece.data for piece in link.receive()] == [b"new"]
+    assert clients[-1].recv(1) == b""
+    assert link.refused == 0

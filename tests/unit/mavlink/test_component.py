@@ -100,3 +100,26 @@ def test_the_memory_of_other_programs_is_bounded() -> None:
         for number in range(256):
             component.observe(foreign(number, system))
     assert len(component._others) <= 255 * len(COMPONENTS)
+
+
+GCS = 6
+
+
+def station(system: int) -> Frame:
+    return parsed(encode(Heartbeat(0, GCS, 8, 0, 4, 3), system=system, component=190, sequence=0))
+
+
+def test_no_heartbeat_has_the_system_id_of_ground_stations() -> None:
+    assert not Component(system=255).may_beat(1)
+    assert not Component().may_beat(255)
+    assert Component(system=7).may_beat(1)
+
+
+def test_no_heartbeat_has_the_system_id_of_a_ground_station_that_is_heard(caplog: pytest.LogCaptureFixture) -> None:
+    component = Component()
+    component.observe(station(1))
+    assert [component.may_beat(1), component.may_beat(1), component.may_beat(2)] == [False, False, True]
+    assert len(caplog.records) == 1
+    for _ in range(62):
+        component.pass_second()
+    assert component.may_beat(1)

@@ -141,7 +141,7 @@ def is_booting(tracked: TrackedVehicle) -> bool:
         return state.profile.states.uninit is Uninit.STARTING
     if beat.system_status in (MAV_STATE_BOOT, MAV_STATE_CALIBRATING):
         return True
-    return state.profile.modes.initialising.get(state.family) == beat.custom_mode
+    return bool(state.profile.modes.initialising.get(state.family) == beat.custom_mode)
 
 
 def _has_stayed(tracked: TrackedVehicle) -> bool:

@@ -110,6 +110,7 @@ MESSAGES: Final[dict[type, Make]] = {
     mav.CommandLong: lambda _, dice: _command(*dice.choice(COMMANDS)),
     mav.CommandAck: lambda _, dice: mav.CommandAck(dice.choice((185, 218)), dice.choice((0, 0, 4)), 0, 0, 0, 0),
     mav.CurrentMode: lambda flight, dice: mav.CurrentMode(flight.mode, flight.mode, dice.randrange(5)),
+    mav.MessageInterval: lambda flight, dice: mav.MessageInterval(dice.randrange(-1, 10**6), dice.randrange(300)),
     mav.AvailableModes: lambda flight, dice: mav.AvailableModes(flight.mode, 0, 1, 1, dice.randrange(5), b"MODE"),
     mav.AutopilotVersion: lambda _, dice: mav.AutopilotVersion(dice.choice((0, 0x01090000, 0x04050600))),
 }

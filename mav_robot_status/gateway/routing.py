@@ -46,10 +46,12 @@ SILENCE: Final = 300.0
 """Seconds after which a silent route is forgotten."""
 PRESENT: Final = 3.0
 """Seconds for which a sender counts as present on a channel, after a frame of it there."""
-BEAT: Final = 1.5
+BEAT: Final = 1.2
 """The same for heartbeats, after a heartbeat there. They come once a second."""
 REPEAT: Final = 0.05
 """Seconds between two repeats of a frame on its first channel. A frame in a loop repeats faster, or others overtake."""
+AGAIN: Final = 0.5
+"""Seconds after the first copy on another channel for which every such frame is dropped."""
 WINDOW: Final = 1.0
 """Copies are recognised for at least this many seconds, and at most twice as many. Decisions are cached as long."""
 MOST_ROUTES: Final = 1024
@@ -61,7 +63,6 @@ MOST_DECISIONS: Final = 4096
 WHOLE: Final = -1  # instead of a component: the whole system
 EVERYBODY: Final = (0, 0)
 UNCHECKED: Final = (0, -1)  # a broadcast that teaches nothing
-CAME_AGAIN: Final = object()
 
 
 class Channel(Protocol):
@@ -94,7 +95,8 @@ class Router(Generic[C]):
         self._decisions: dict[tuple[C, tuple[int, int], tuple[int, int]], tuple[C, ...]] = {}
         """By channel, sender and target."""
         self._recent: dict[int, object] = {}
-        """The frames of this window, by hash: the channel on which each arrived first, or CAME_AGAIN."""
+        """The frames of this window, by hash: the channel on which each arrived first, or when a copy showed that it
+        also comes on another one."""
         self._older: dict[int, object] = {}
         """The frames of the previous window."""
         self._newest: dict[tuple[C, tuple[int, int]], int] = {}
@@ -208,15 +210,18 @@ class Router(Generic[C]):
         key = hash(frame.raw)
         recent = self._recent.get(key)
         first = recent or self._older.get(key)
-        if first is None or first == came_from:
-            self._recent[key] = came_from
-            sender = came_from, frame.ids
-            constant = self._newest.get(sender) == frame.sequence
-            self._newest[sender] = frame.sequence
-            return recent is not None and not (constant and self._may_repeat(key, now))
-        if first is not CAME_AGAIN:
-            self._recent[key] = CAME_AGAIN
-        return True
+        if first is not None and first != came_from:
+            if not isinstance(first, float):
+                self._recent[key] = now
+                return True
+            if now - first < AGAIN:
+                return True
+            recent = None  # its sender repeats itself on two ways
+        sender = came_from, frame.ids
+        constant = self._newest.get(sender) == frame.sequence
+        self._newest[sender] = frame.sequence
+        self._recent[key] = came_from
+        return recent is not None and not (constant and self._may_repeat(key, now))
 
     def _may_repeat(self, key: int, now: float) -> bool:
         if now - self._repeated.get(key, -math.inf) < REPEAT:

@@ -130,7 +130,9 @@ HEARD_TOO = [
 ]
 
 
-@pytest.mark.parametrize(("passed_on", "ago", "message", "to"), [c[1:] for c in HEARD_TOO], ids=[c[0] for c in HEARD_TOO])
+@pytest.mark.parametrize(
+    ("passed_on", "ago", "message", "to"), [c[1:] for c in HEARD_TOO], ids=[c[0] for c in HEARD_TOO]
+)
 def test_a_frame_is_held_back_only_while_its_sender_still_comes_from_there(
     passed_on: NamedTuple, ago: float, message: NamedTuple, to: tuple[End, ...]
 ) -> None:

@@ -35,12 +35,13 @@ def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
     """
     errors = [{"code": e.code, "name": e.name, "text": e.text, "since": rfc3339(e.since_us)} for e in detail.errors]
     inhibits = [{"name": i.name, "text": i.text, "since": rfc3339(i.since_us)} for i in detail.inhibits]
-    return (
+    body = (
         f"{_who(handle, detail.system, detail.component)}, {_fields(status)}, "
         f'"errors": {json.dumps(errors) if errors else "[]"}, '
         f'"inhibits": {json.dumps(inhibits) if inhibits else "[]"}, '
         f'"vehicle": {_vehicle(detail.vehicle)}, "link": {{"state": "{detail.link.value}"'
     )
+    return body.replace("\x7f", r"\u007f")  # the one control character that JSON does not escape
 
 
 @lru_cache(maxsize=256)

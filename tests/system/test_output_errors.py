@@ -43,7 +43,7 @@ def test_a_file_without_room_grows_again_and_everything_else_goes_on(
     )
     rover = wire(gate.address).beating()
     ground = wire(("127.0.0.1", gate.ports(2)[1]), system=255, component=190).beating()
-    wait_until(lambda: path.stat().st_size > 5000)
+    wait_until(lambda: path.exists() and path.stat().st_size > 5000)
     room(gate, path.stat().st_size + 100)
     gate.wait_for_log("cannot write JSON lines to .*: File too large")
     full = whole_lines(path)

@@ -1,8 +1,8 @@
 """Lines to a file or to standard output. Never blocks. An output that fails is tried again, and never has half a line.
 
 A write can fail at any time: no room (ENOSPC, EFBIG, EDQUOT), a defect (EIO), a file system that went away, a FIFO
-whose reader left. While it fails, only the latest line of each robot is held; the others are counted. Only the end of the
-reader of standard output is an error, because nobody reads the program then.
+whose reader left. While it fails, only the latest line of each robot is held; the others are counted. Only the end of
+the reader of standard output is an error, because nobody reads the program then.
 """
 
 from __future__ import annotations

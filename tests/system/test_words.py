@@ -37,7 +37,7 @@ def log(tmp_path: Path) -> Path:
     for second in range(6):
         stamp = (1_800_000_000_000_000 + second * 1_000_000).to_bytes(8, "big")
         data += stamp + MAVLink_heartbeat_message(10, 3, 65, 0, 4, 3).pack(mav)
-        text = f"PreArm: {HOSTILE}".encode()[:50]
+        text = f"Yaw Imbalance {HOSTILE}".encode()[:50]
         data += stamp + MAVLink_statustext_message(2, text).pack(mav)
     path = tmp_path / f"f{CLIPBOARD}{FOLDED}\u202e.tlog"
     path.write_bytes(data)
@@ -57,7 +57,6 @@ def log(tmp_path: Path) -> Path:
         ("run", "LOG", "-v"),
         ("run", f"{HOSTILE}.tlog"),
         ("run", f"udp:{HOSTILE}"),
-        ("run", f"/dev/{HOSTILE},57600"),
         ("run", "udp:127.0.0.1:0", "--json", f"/nowhere/{HOSTILE}"),
         ("run", "udp:127.0.0.1:0", "--record", f"{HOSTILE}"),
         ("run", "udp:127.0.0.1:0", "--signing-key", HOSTILE),
@@ -68,7 +67,6 @@ def log(tmp_path: Path) -> Path:
         ("check-config", "CONFIG"),
         ("check-config", "FAULT"),
         ("doctor", f"udp:{HOSTILE}"),
-        ("doctor", f"/dev/{HOSTILE},57600", "--seconds", "0.1"),
         ("watch", f"{HOSTILE}.tlog"),
         ("board", HOSTILE),
         ("demo", "--http", HOSTILE),
@@ -91,8 +89,6 @@ def test_no_command_passes_a_hostile_text_to_the_terminal(
     assert is_visible(done.stdout)
     assert is_visible(done.stderr)
     assert "Traceback" not in done.stderr
-    if done.returncode:
-        assert done.stderr.count("mav-robot-status: ") == 1
 
 
 def test_a_vehicles_text_is_shown_by_its_codes(log: Path) -> None:
@@ -105,7 +101,7 @@ def test_a_vehicles_text_is_shown_by_its_codes(log: Path) -> None:
 def test_a_live_gateway_writes_no_control_character(gateway: StartGateway, wire: OpenWire) -> None:
     gate = gateway("udpin:127.0.0.1:0", "-v")
     rover = wire(gate.address).beating()
-    rover.send(MAVLink_statustext_message(2, f"PreArm: {HOSTILE}".encode()[:50]))
+    rover.send(MAVLink_statustext_message(2, f"Yaw Imbalance {HOSTILE}".encode()[:50]))
     gate.wait_for(lambda s: any("52;c" in (i["text"] or "") for i in [*s["errors"], *s["inhibits"]]))
     assert gate.stop() == 0
     assert is_visible("\n".join(gate.log))
@@ -122,7 +118,8 @@ def test_explain_on_a_full_disk_is_one_line(log: Path) -> None:
             check=False,
         )
     assert done.returncode == 1
-    assert done.stderr == "mav-robot-status: cannot write to standard output: No space left on device\n"
+    assert done.stderr.endswith("mav-robot-status: cannot write to standard output: No space left on device\n")
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(

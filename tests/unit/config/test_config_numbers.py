@@ -41,26 +41,11 @@ OTHERS = [
     "links: ['udp:127.0.0.1:VALUE']\n",
     "links: ['/dev/ttyS9,VALUE']\n",
     "outs: ['tcp:127.0.0.1:VALUE']\n",
-    STANZA.format("publishers: [{{type: mqtt, url: 'mqtt://broker:VALUE/robots'}}]")
-    .replace("{{", "{")
-    .replace("}}", "}"),
-    STANZA.format("publishers: [{{type: http, listen: '127.0.0.1:VALUE'}}]").replace("{{", "{").replace("}}", "}"),
+    STANZA.format("publishers: [{type: mqtt, url: 'mqtt://broker:VALUE/robots'}]"),
+    STANZA.format("publishers: [{type: http, listen: '127.0.0.1:VALUE'}]"),
 ]
-ABSURD = [
-    "-1",
-    "0",
-    ".nan",
-    ".inf",
-    "-.inf",
-    "1e308",
-    "-1e308",
-    "1e-320",
-    "1e999",
-    "9" * 30,
-    "9" * 5000,
-    "0x7fffffffffff",
-]
-ABSURD += ["''", "abc", "[1]", "{a: 1}", "true", "~", "1_000_000_000_000", "1:30:00", "1 year", "{handle:>2000000000}"]
+ABSURD = ["-1", "0", ".nan", ".inf", "-.inf", "1e308", "-1e308", "1e-320", "1e999", "9" * 30, "9" * 5000]
+ABSURD += ["0x7fffffffffff", "''", "abc", "[1]", "{a: 1}", "true", "~", "1_000_000_000_000", "1:30:00", "1 year"]
 
 
 def is_number(hint: Any) -> bool:
@@ -75,8 +60,7 @@ def numeric_keys() -> Iterator[str]:
     for name, options, first in PUBLISHERS:
         for one in options.declared():
             if one.kind is float:
-                option = f"publishers: [{{type: {name}, {first}{one.name}: VALUE}}]"
-                yield STANZA.replace("{}", "OPTION").format().replace("OPTION", option)
+                yield STANZA.format(f"publishers: [{{type: {name}, {first}{one.name}: VALUE}}]")
     yield from OTHERS
 
 

@@ -7,7 +7,7 @@ The rules are those of https://mavlink.io/en/guide/routing.html. Where they leav
   (MAVLink_routing.cpp, 2c); mavlink-router drops the frame. This reaches a component behind the autopilot that only
   listens, as on a direct cable.
 * A broadcast does not go to a channel from which its sender still comes: receivers there already have it
-  (mavlink-router, accept_msg). "Still" means PRESENT seconds, and for a heartbeat BEAT seconds since the last heartbeat
+  (mavlink-router, accept_msg). "Still" means PRESENT seconds, and for a heartbeat BEAT_PRESENT seconds since the last heartbeat
   there. An autopilot passes the heartbeat of a ground station on to us. When the station then changes its way and
   comes through us alone, the autopilot must have its heartbeats within two seconds: they keep its failsafe away.
 * A frame for one system is never held back for that reason. A command that arrives twice is better than one that is
@@ -46,7 +46,7 @@ SILENCE: Final = 300.0
 """Seconds after which a silent route is forgotten."""
 PRESENT: Final = 3.0
 """Seconds for which a sender counts as present on a channel, after a frame of it there."""
-BEAT: Final = 1.2
+BEAT_PRESENT: Final = 1.2
 """The same for heartbeats, after a heartbeat there. They come once a second."""
 REPEAT: Final = 0.05
 """Seconds between two repeats of a frame on its first channel. A frame in a loop repeats faster, or others overtake."""
@@ -157,7 +157,7 @@ class Router(Generic[C]):
         route = came_from, *sender
         if route in self._heard:
             self._beats[route] = now
-        return self._decide(came_from, sender, EVERYBODY, self._beats, now - BEAT)
+        return self._decide(came_from, sender, EVERYBODY, self._beats, now - BEAT_PRESENT)
 
     def plan(
         self, data: bytes, frames: Sequence[Frame], came_from: C, channels: tuple[C, ...], now: float

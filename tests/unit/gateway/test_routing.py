@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fuzz.routing import World
 from mav_robot_status.gateway.routing import (
     AGAIN,
-    BEAT,
+    BEAT_PRESENT,
     MOST_FRAMES,
     MOST_ROUTES,
     PRESENT,
@@ -120,7 +120,7 @@ THERE = (VEHICLE, CAMERA, OTHER)  # the vehicle links that may be sent to
 HEARD_TOO = [
     # case: the message that VEHICLE passed on from a ground station, seconds ago; what comes from it on GROUND; to
     ("its heartbeat comes from there", BEAT_OF_GROUND, 1.0, BEAT_OF_GROUND, (CAMERA, OTHER)),
-    ("its heartbeat comes no more from there", BEAT_OF_GROUND, BEAT + 0.01, BEAT_OF_GROUND, THERE),
+    ("its heartbeat comes no more from there", BEAT_OF_GROUND, BEAT_PRESENT + 0.01, BEAT_OF_GROUND, THERE),
     ("the link was left minutes ago", BEAT_OF_GROUND, 200.0, BEAT_OF_GROUND, THERE),
     ("only other messages come from there", ATTITUDE, 0.1, BEAT_OF_GROUND, THERE),
     ("a broadcast while it comes from there", BEAT_OF_GROUND, 1.0, ATTITUDE, (CAMERA, OTHER)),

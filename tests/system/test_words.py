@@ -71,6 +71,7 @@ def log(tmp_path: Path) -> Path:
         ("board", HOSTILE),
         ("demo", "--http", HOSTILE),
         ("dialect", "-o", "FOLDER"),
+        ("applet", "-o", "SCRIPT"),
         (HOSTILE,),
     ],
     ids=lambda arguments: " ".join(arguments).encode("unicode_escape").decode()[:40],
@@ -84,7 +85,7 @@ def test_no_command_passes_a_hostile_text_to_the_terminal(
         f"links: ['/dev/tty{json.dumps(HOSTILE)[1:-1]}']\n".replace("'", '"') + "record: flight.tlog\n", "utf-8"
     )
     fault.write_text(f'"{json.dumps(HOSTILE)[1:-1]}": 1\n', "utf-8")
-    places = {"LOG": log, "CONFIG": config, "FAULT": fault, "FOLDER": folder}
+    places = {"LOG": log, "CONFIG": config, "FAULT": fault, "FOLDER": folder, "SCRIPT": folder / f"{HOSTILE}.lua"}
     done = run(*(str(places.get(a, a)) for a in arguments), cwd=tmp_path)
     assert is_visible(done.stdout)
     assert is_visible(done.stderr)

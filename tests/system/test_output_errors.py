@@ -10,6 +10,7 @@ import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from ..deadline import SOON, allow, wait_until
 from .gateway_process import COMMAND, Gateway
@@ -27,6 +28,11 @@ def whole_lines(path: Path) -> list[int]:
     text = path.read_text("utf-8")
     assert text.endswith("\n")
     return [json.loads(line)["seq"] for line in text.splitlines()]
+
+
+def powered(armed: bool) -> Callable[[Any], bool]:
+    """Whether a ROBOT_STATUS says so."""
+    return lambda message: bool(message.drives_powered == armed)
 
 
 def room(gate: Gateway, size: int) -> None:
@@ -49,7 +55,7 @@ def test_a_file_without_room_grows_again_and_everything_else_goes_on(
     full = whole_lines(path)
     for armed in (True, False, True):
         since = rover.beat(armed=armed)
-        rover.wait_for("ROBOT_STATUS", lambda m, armed=armed: m.drives_powered == armed, after=since)
+        rover.wait_for("ROBOT_STATUS", powered(armed), after=since)
         ground.wait_for("HEARTBEAT", lambda m: m.get_srcSystem() == 1 and m.get_srcComponent() == 1, after=since)
     assert whole_lines(path) == full
     recorded = recording.stat().st_size

@@ -55,8 +55,9 @@ class LineOutput:
         self._retry_at = math.inf
         self._poll = select.poll()
         self._fd = -1
+        descriptor = stdout.fileno() if self._path is None else -1
         try:
-            self._open(stdout.fileno() if self._path is None else -1)
+            self._open(descriptor)
         except OSError as error:
             raise LinkError(f"cannot write JSON lines to {self.text}: {error.strerror}") from None
 
@@ -220,8 +221,10 @@ class PatientLineOutput:
         self._waiting = 0
         self._owned = path != "-"
         self.text = path if self._owned else "standard output"
+        self._fd = -1 if self._owned else stdout.fileno()
         try:
-            self._fd = os.open(path, FLAGS, MODE) if self._owned else stdout.fileno()
+            if self._owned:
+                self._fd = os.open(path, FLAGS, MODE)
         except OSError as error:
             raise LinkError(f"cannot write JSON lines to {self.text}: {error.strerror}") from None
         if self._owned and _ends_within_a_line(path, self._fd):

@@ -60,6 +60,7 @@ def main() -> None:
     write("texts", [b"".join(bytes([20, 3, n % 4, n]) + text[10:30] for n in range(12)), rng.randbytes(500)])
     write("configuration", [*(path.read_bytes() for path in sorted(EXAMPLES.glob("*.yaml"))), RARE])
     forms = [form for kind in KINDS for form in kind.forms.split()]
+    write("routing", [b"one", b"two"])
     write("connection", [kind.example.encode() for kind in KINDS] + [form.encode() for form in forms])
 
 

@@ -20,6 +20,8 @@ from mav_robot_status.mavlink.framing import Frame, Parser
 from mav_robot_status.mavlink.signing import Signer, Verifier, is_signed
 from mav_robot_status.mavlink.wire import MAX_FRAME
 
+from .routing import World
+
 PIECE: Final = 97
 """Bytes of one feed, so that feeds end anywhere within a frame."""
 KEY: Final = bytes(32)
@@ -124,6 +126,13 @@ def connection(data: bytes) -> int:
     return 1
 
 
+def routing(data: bytes) -> int:
+    """A minute of a companion computer whose links come and go: no heartbeat is late, no loop amplifies."""
+    world = World(data)
+    world.run(60.0)
+    return world.made
+
+
 def _one_line(error: Exception) -> None:
     text = str(error)
     assert text, "the error has no message"
@@ -138,6 +147,7 @@ TARGETS: Final[dict[str, Callable[[bytes], int]]] = {
     "texts": texts,
     "configuration": configuration,
     "connection": connection,
+    "routing": routing,
 }
 UNITS: Final = {"configuration": "configurations", "connection": "connection strings", "texts": "chunks"}
 

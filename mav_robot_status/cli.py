@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from .commands import COMMANDS, PROGRAM, command
 from .errors import MavRobotStatusError, UsageError
-from .streams import StderrHandler, complain, detach, open_missing
+from .streams import StderrHandler, complain, detach, open_missing, writing
 from .version import __version__
 
 if TYPE_CHECKING:
@@ -64,7 +64,8 @@ def _run(arguments: list[str]) -> int:
             _log_to_stderr(options)
         return command(options.command).run(options)
     finally:
-        sys.stdout.flush()  # here, where a closed pipe can be handled
+        with writing():
+            sys.stdout.flush()  # here, where a closed pipe can be handled
 
 
 def _parser(asked: str) -> argparse.ArgumentParser:
@@ -86,7 +87,7 @@ def _parser(asked: str) -> argparse.ArgumentParser:
 
 def _log_to_stderr(options: argparse.Namespace) -> None:
     level = logging.DEBUG if options.verbose else logging.WARNING if options.quiet else logging.INFO
-    logging.basicConfig(level=level, handlers=[StderrHandler(sys.stderr)], format=f"{PROGRAM}: %(message)s")
+    logging.basicConfig(level=level, handlers=[StderrHandler(sys.stderr, f"{PROGRAM}: %(message)s")])
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from ..data_files import data_file
 from ..errors import LinkError
+from ..streams import say
 
 if TYPE_CHECKING:
     import argparse
@@ -30,5 +31,5 @@ def run(options: argparse.Namespace) -> int:
         Path(options.output).write_text(script, "utf-8")
     except OSError as error:
         raise LinkError(f"cannot write {options.output}: {error.strerror}") from None
-    print(options.output)  # noqa: T201
+    say(options.output)
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..config import describe, load
+from ..streams import say
 
 if TYPE_CHECKING:
     import argparse
@@ -21,5 +22,5 @@ def run(options: argparse.Namespace) -> int:
 
     config = load(options.file)
     check(config)
-    print("\n".join(describe(config)))  # noqa: T201
+    say(*describe(config))
     return 0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..streams import say
+
 if TYPE_CHECKING:
     import argparse
 
@@ -18,5 +20,5 @@ def run(options: argparse.Namespace) -> int:
     from ..mavlink.dialect_files import write_files
 
     for path in write_files(options.output):
-        print(path)  # noqa: T201
+        say(str(path))
     return 0

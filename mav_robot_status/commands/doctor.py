@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..links.url import parse
+from ..streams import say
 from .options import connections, looking, seconds
 from .overrides import configured
 
@@ -34,5 +35,5 @@ def run(options: argparse.Namespace) -> int:
     for link in config.links:
         found, diagnosis = examine(config, link, options.seconds)
         ok = ok and diagnosis.ok
-        print(as_json(found, diagnosis) if options.as_json else as_text(found, diagnosis), flush=True)  # noqa: T201
+        say(*([as_json(found, diagnosis)] if options.as_json else as_text(found, diagnosis)))
     return 0 if ok else 1

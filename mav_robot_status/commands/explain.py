@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import NothingHeardError, UsageError
 from ..links.url import parse
+from ..streams import say
 from .options import connections, looking
 from .overrides import configured
 
@@ -36,5 +37,5 @@ def run(options: argparse.Namespace) -> int:
         found = explain_live(config, sys.stdout)
     if not found:
         raise NothingHeardError("no autopilot was heard, so there is nothing to explain")
-    print(as_json(found) if options.as_json else as_table(found))  # noqa: T201
+    say(*(as_json(found) if options.as_json else as_table(found)))
     return 0

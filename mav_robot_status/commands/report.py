@@ -9,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from ..errors import NothingHeardError
+from ..streams import say
 from ..version import __version__
 from . import PROGRAM
 from .options import system, verbosity
@@ -42,12 +43,12 @@ def run(options: argparse.Namespace) -> int:
     if not any(timeline.vehicles for timeline in timelines):
         raise NothingHeardError("no autopilot was heard, so there is nothing to show")
     if options.as_json:
-        print(as_json(timelines))  # noqa: T201
+        say(*as_json(timelines).split("\n"))
     if options.output or not options.as_json:
         output = options.output or f"{os.path.splitext(timelines[0].name)[0]}.html"
         save(as_html(timelines, f"{PROGRAM} {__version__}"), output)
         if not options.as_json:
-            print(output)  # noqa: T201
+            say(output)
     return 0
 
 

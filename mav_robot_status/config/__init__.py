@@ -44,6 +44,6 @@ def load(path: str | os.PathLike[str]) -> Config:
 
 def describe(config: Config) -> list[str]:
     """What a configuration means, one line per part."""
-    from .describe import describe
+    from .description import describe
 
     return describe(config)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any, Final, get_type_hints
+from typing import Annotated, Any, Final, get_type_hints
 
-from ..hardware.mavlink.options import BELOW
+from ..errors import UsageError
+from ..hardware.mavlink.options import BELOW, Within
 from ..interface import DEFAULT_HANDLE_NAME
 from ..links import url
+from ..links.tlog_file import check_name
 from ..mavlink.component import GROUND_STATION
 from .document import Node, load_document, quoted
 from .model import Config, ControllerConfig, HardwareConfig, PublisherConfig, VehicleConfig
@@ -22,7 +24,7 @@ MAVLINK: Final = "mavlink"
 """The type of the MAVLink hardware interface in a list."""
 PARAMETERS: Final[dict[str, Any]] = {
     "handle_name": str,
-    "publish_rate": float,
+    "publish_rate": Annotated[float, Within(0.0, 1000.0, "Hz")],
     "publish_on_change": bool,
     "publishers": tuple[PublisherConfig, ...],
 }
@@ -48,6 +50,7 @@ def build(document: Node) -> Config:
     config = Config(**read_sections, interfaces=interfaces, controllers=tuple(stanzas))
     _check_hysteresis(config, given)
     _check_outs(config, given)
+    _check_record(config.record, given)
     _check_vehicles(config.vehicles, given)
     _check_identity(config, given)
     _check_handles(config, given)
@@ -123,6 +126,14 @@ def _check_outs(config: Config, given: dict[str, Node]) -> None:
             )
         if out.passive:
             raise entries(node)["passive"].key_fault("an out cannot be passive: remove 'passive'")
+
+
+def _check_record(path: str | None, given: dict[str, Node]) -> None:
+    if path is not None:
+        try:
+            check_name(path)
+        except UsageError as error:
+            raise given["record"].fault(str(error)) from None
 
 
 def _check_vehicles(vehicles: tuple[VehicleConfig, ...], given: dict[str, Node]) -> None:

@@ -130,14 +130,14 @@ def _is_heard(handle: IndustrialRobotStatusHandle) -> bool:
     return handle.detail.link is not LinkState.NEVER_SEEN
 
 
-def as_json(found: Iterable[dict[str, Any]]) -> str:
-    """The explanations as JSON, one object per line."""
-    return "\n".join(json.dumps(one) for one in found)
+def as_json(found: Iterable[dict[str, Any]]) -> list[str]:
+    """The explanations as lines of JSON, one object each."""
+    return [json.dumps(one) for one in found]
 
 
-def as_table(found: Iterable[dict[str, Any]]) -> str:
-    """The explanations as tables for a person."""
-    return "\n\n".join("\n".join(_table(one)) for one in found)
+def as_table(found: Iterable[dict[str, Any]]) -> list[str]:
+    """The explanations as tables for a person: their lines, with an empty one between two tables."""
+    return [line for one in found for line in ("", *_table(one))][1:]
 
 
 def _table(one: dict[str, Any]) -> Iterator[str]:

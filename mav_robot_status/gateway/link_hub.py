@@ -12,11 +12,12 @@ from ..config import Config
 from ..hardware.mavlink.message_table import COMMAND_IDS, WANTED_IDS
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
-from ..mavlink.signing import Verdict
+from ..mavlink.signing import ACCEPTED, Verdict
 from .endpoint import Endpoint
 from .path_selection import PathSelection
 from .routing import Router
 from .sender import Sender, speaks_for
+from .signing_policy import proof
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,7 +37,7 @@ REQUEST_SIZE: Final = 45  # bytes of a COMMAND_LONG
 BATCH: Final = 64
 """Pieces read before parsing. Bounds the memory in a flood of long pieces."""
 SETUP_SIGNING: Final = 256
-"""This message contains a key. It is never forwarded."""
+"""This message contains a key. It is never recorded or forwarded."""
 
 
 class LinkHub:
@@ -126,7 +127,12 @@ class LinkHub:
                 channel = endpoint.channel(source)
                 frames = channel.parser.feed(data)
                 if self._keep_all:
-                    self._record_and_forward(data, frames, channel, now)
+                    frames = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
+                    self._record(frames, now)
+                if self.sender.signing_policy is not None:
+                    frames = self._believed(frames, channel, now)
+                if self._keep_all:
+                    self._forward(data, frames, channel, now)
                     frames = [frame for frame in frames if frame.message_id in WANTED_IDS]
                 for frame in frames:
                     if self._accepts(frame, channel, now):
@@ -140,14 +146,22 @@ class LinkHub:
             for data, source in pieces:
                 observer.on_data(data, source, now)
 
+    def _believed(self, frames: list[Frame], channel: Channel, now: Instant) -> list[Frame]:
+        """The frames that the signing policy accepts. All others have no effect, and are not forwarded."""
+        policy = self.sender.signing_policy
+        assert policy is not None
+        believed = []
+        for frame in frames:
+            verdict = policy.judge(frame, now)
+            if verdict in ACCEPTED:
+                believed.append(frame)
+            elif frame.message_id == HEARTBEAT and policy.may_heal(verdict, now.mono):
+                self.sender.send_heartbeat(channel, frame.ids[0])
+        return believed
+
     def _accepts(self, frame: Frame, channel: Channel, now: Instant) -> bool:
         """Whether the hardware interface gets this frame. Handles commands to us."""
-        signing_policy = self.sender.signing_policy
-        verdict = None if signing_policy is None else signing_policy.judge(frame, now)
-        if verdict is not None and verdict not in (Verdict.VERIFIED, Verdict.LET_THROUGH):
-            if frame.message_id == HEARTBEAT and signing_policy and signing_policy.may_heal(verdict, now.mono):
-                self.sender.send_heartbeat(channel, frame.ids[0])
-            return False
+        verdict = None if self.sender.signing_policy is None else proof(frame)
         endpoint = channel.endpoint
         if frame.message_id == HEARTBEAT:
             self.sender.component.observe(frame)
@@ -203,15 +217,16 @@ class LinkHub:
             self.needs_turn = True
             self._requests |= {(channel, v) for v in vehicles if self.sender.component.system_for(v) == found.system}
 
-    def _record_and_forward(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant) -> None:
-        """Record frames, and forward them by MAVLink's routing rules."""
+    def _record(self, frames: list[Frame], now: Instant) -> None:
         recorder = self.sender.recorder
         if recorder is not None:
             for frame in frames:
                 recorder.write(now.unix_us, frame.raw)
+
+    def _forward(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant) -> None:
+        """Forward frames by MAVLink's routing rules."""
         if self._router is None or not channel.endpoint.is_peer(channel):
             return
-        frames = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
         if self._channels is None:
             self._channels = tuple(channel for endpoint in self.endpoints for channel in endpoint.peers())
         whole = b"" if channel.endpoint.link.stream else data

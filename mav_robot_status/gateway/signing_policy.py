@@ -6,7 +6,7 @@ import logging
 import math
 from typing import TYPE_CHECKING, Final
 
-from ..mavlink.signing import WORDS, Signer, Verdict, Verifier
+from ..mavlink.signing import WORDS, Signer, Verdict, Verifier, is_signed
 from .signing_keys import StampStore, read_key, stamp_path
 
 if TYPE_CHECKING:
@@ -63,3 +63,8 @@ class SigningPolicy:
         self._store.close(self._signer.stamp)
         if found := self.summary():
             log.info("signing: %s", found)
+
+
+def proof(accepted: Frame) -> Verdict:
+    """The verdict on a frame that was accepted: VERIFIED or LET_THROUGH."""
+    return Verdict.VERIFIED if is_signed(accepted) else Verdict.LET_THROUGH

@@ -72,7 +72,7 @@ class Options:
         declared = {one.name: one for one in cls.declared()}
         for name in given:
             if name not in declared:
-                raise UsageError(f"{publisher}: unknown option '{name}'; {_known(name, declared)}")
+                raise UsageError(f"{publisher}: unknown option {short(name)}; {_known(name, declared)}")
         values: dict[str, Any] = {
             name: _value(f"{publisher}: {name}", declared[name], value)
             for name, value in given.items()
@@ -82,6 +82,12 @@ class Options:
             if one.name not in values and one.default is dataclasses.MISSING:
                 raise UsageError(f"{publisher}: the option '{one.name}' is missing: {one.option.help}")
         return cls(**values)
+
+
+def short(value: object, most: int = 60) -> str:
+    """A user's value for a message: in quotes if it is a text, and cut to `most` characters."""
+    shown = repr(value)
+    return shown if len(shown) <= most else f"{shown[: most - 4]}...{shown[-1]}"
 
 
 _DECLARED: dict[type, tuple[Declared, ...]] = {}
@@ -110,21 +116,21 @@ def _value(what: str, declared: Declared, value: object) -> object:
     if declared.kind is bool:
         if isinstance(value, bool):
             return value
-        raise UsageError(f"{what}: must be true or false, not {value!r}")
+        raise UsageError(f"{what}: must be true or false, not {short(value)}")
     if declared.kind is float:
         return _number(what, declared.option, value)
     if declared.kind is tuple and isinstance(value, list | tuple):
         return tuple(_text(what, item) for item in value)
     text = _text(what, value)
     if declared.option.choices and text not in declared.option.choices:
-        raise UsageError(f"{what}: must be one of {', '.join(declared.option.choices)}, not {text!r}")
+        raise UsageError(f"{what}: must be one of {', '.join(declared.option.choices)}, not {short(text)}")
     return (text,) if declared.kind is tuple else text
 
 
 def _text(what: str, value: object) -> str:
     if isinstance(value, str | int | float) and not isinstance(value, bool):
         return str(value)
-    raise UsageError(f"{what}: must be a text, not {value!r}")
+    raise UsageError(f"{what}: must be a text, not {short(value)}")
 
 
 def _number(what: str, option: Option, value: object) -> float:
@@ -136,4 +142,4 @@ def _number(what: str, option: Option, value: object) -> float:
         if option.low <= number <= option.high and math.isfinite(number):
             return number
     bounds = f" from {option.low:g} to {option.high:g}" if math.isfinite(option.low + option.high) else ""
-    raise UsageError(f"{what}: must be a number{bounds}, not {value!r}")
+    raise UsageError(f"{what}: must be a number{bounds}, not {short(value)}")

@@ -22,6 +22,8 @@ CHUNK: Final = 1 << 16
 """The most bytes of one write, except for a longer record."""
 TAIL: Final = 1 << 16
 """Bytes at the end of a file in which the last whole record is searched."""
+MODE: Final = 0o640
+"""Permissions of a new file: a recording shows where people live. A file that exists keeps its own."""
 MAX_RECORD: Final = 8 + 10 + 255 + 2 + 13
 """Bytes of the longest record: stamp, header, payload, CRC, signature."""
 # A stamp before 2112, which begins with 12 zero bits, and the part of a header with the length of the frame.
@@ -106,7 +108,7 @@ class TlogFile:
         real = self._names[0]
         if os.path.exists(real) and not os.path.isfile(real):
             raise UsageError(f"cannot record to {self._path!r}: it is not a file; write for example flight.tlog")
-        descriptor = os.open(real, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+        descriptor = os.open(real, os.O_RDWR | os.O_CREAT | os.O_APPEND, MODE)
         try:
             _lock(descriptor)
             there = os.fstat(descriptor).st_size
@@ -127,10 +129,15 @@ class TlogFile:
             self._descriptor = -1
 
 
-def open_tlog(path: str, max_bytes: int, keep: int) -> TlogFile:
-    """The open file. Raises LinkError or UsageError, one line that says what to do."""
+def check_name(path: str) -> None:
+    """Raise UsageError for a name that no recording has."""
     if not path.lower().endswith(".tlog"):
         raise UsageError(f"cannot record to {path!r}: the name must end in .tlog; write for example flight.tlog")
+
+
+def open_tlog(path: str, max_bytes: int, keep: int) -> TlogFile:
+    """The open file. Raises LinkError or UsageError, one line that says what to do."""
+    check_name(path)
     try:
         return TlogFile(path, max_bytes, keep)
     except OSError as error:

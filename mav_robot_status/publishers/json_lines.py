@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
-import os
-import select
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from ..clock import rfc3339
-from ..errors import LinkError
 from ..interface import FIELDS, Kind, RobotMode, TriState
 from ..interface.options import Option, Options
+from .line_output import LineOutput, PatientLineOutput
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -21,11 +18,6 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg, Vehicle
 
-PIPE_BUF: Final = 4096
-"""Bytes that a pipe which poll() calls writable takes without blocking (PIPE_BUF of Linux)."""
-CHUNK: Final = 1 << 16  # bytes written at once on replay
-RETRY: Final = 0.005  # s until a full pipe is tried again
-LOOK: Final = 1.0  # s between two checks of an idle reader
 WORDS: Final[dict[Kind, Mapping[int, str]]] = {
     Kind.MODE: {mode: f'"{mode.name}"' for mode in RobotMode},
     Kind.TRI_STATE: {TriState.UNKNOWN: "null", TriState.FALSE: "false", TriState.TRUE: "true"},
@@ -43,12 +35,13 @@ def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
     """
     errors = [{"code": e.code, "name": e.name, "text": e.text, "since": rfc3339(e.since_us)} for e in detail.errors]
     inhibits = [{"name": i.name, "text": i.text, "since": rfc3339(i.since_us)} for i in detail.inhibits]
-    return (
+    body = (
         f"{_who(handle, detail.system, detail.component)}, {_fields(status)}, "
         f'"errors": {json.dumps(errors) if errors else "[]"}, '
         f'"inhibits": {json.dumps(inhibits) if inhibits else "[]"}, '
         f'"vehicle": {_vehicle(detail.vehicle)}, "link": {{"state": "{detail.link.value}"'
     )
+    return body.replace("\x7f", r"\u007f")  # the one control character that JSON does not escape
 
 
 @lru_cache(maxsize=256)
@@ -118,43 +111,34 @@ class JsonOptions(Options):
 class JsonLinesPublisher:
     """Writes lines to a file or to standard output. A slow reader loses lines; it never blocks the gateway.
 
-    Raises BrokenPipeError after the reader has closed its end, LinkError for every other failure (a full disk).
+    A replay waits for a slow reader instead. Raises BrokenPipeError after the reader of standard output has closed its
+    end, and LinkError if the output cannot be opened, or if it fails in a replay.
     """
 
     options_type = JsonOptions
 
     def __init__(self, context: PublisherContext) -> None:
         options = JsonOptions.read("json", context.options)
-        path = options.path
         self._format = options.format
         self.periodic = not options.changes_only
-        if path == "-":
-            self._fd, self._owned = context.stdout.fileno(), False
-        else:
-            try:
-                self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o644)
-            except OSError as error:
-                raise LinkError(f"cannot write JSON lines to {path}: {error.strerror}") from None
-            self._owned = True
-        self._path = "standard output" if path == "-" else path
-        self._patient = context.patient
-        self._look_at = -math.inf
-        self._waiting = 0
-        self._lines: list[bytes] = []
-        self._poll = select.poll()
-        self._poll.register(self._fd, select.POLLOUT)
-        self._rest = b""
+        output = PatientLineOutput if context.patient else LineOutput
+        self._output: LineOutput | PatientLineOutput = output(options.path, context.stdout)
         self._seq: dict[str, int] = {}
         self._bodies: dict[str, tuple[RobotStatus, Detail, str]] = {}
 
     def busy(self) -> bool:
         """True while an earlier line is written in part, or the pipe is full."""
-        return not self._patient and (bool(self._rest) or not self._writable())
+        return self._output.busy()
 
     @property
     def queued(self) -> int:
-        """1 while a line is written in part."""
-        return int(bool(self._rest))
+        """The lines that wait."""
+        return self._output.queued
+
+    @property
+    def dropped(self) -> int:
+        """The lines that are missing because the output failed."""
+        return self._output.dropped
 
     def publish(self, msg: RobotStatusMsg) -> None:
         """Write one line."""
@@ -162,20 +146,11 @@ class JsonLinesPublisher:
         self._seq[msg.handle] = seq + 1
         other = ROS_FORMATS.get(self._format)
         line = native(msg, seq, self._body(msg)) if other is None else other(msg, seq)
-        if self._patient:
-            self._collect(line.encode())
-        else:
-            self._rest = line.encode()
-            self._write()
+        self._output.write(msg.handle, line.encode())
 
     def service(self, now: Instant) -> float | None:
-        """Write the rest of a long line. Check whether an idle reader has closed its end."""
-        if self._rest:
-            self._write()
-        elif now.mono >= self._look_at and not self._patient:
-            self._look_at = now.mono + LOOK
-            self._writable()
-        return now.mono + RETRY if self._rest else None
+        """Write what waits. Check whether an idle reader has closed its end."""
+        return self._output.service(now)
 
     def forget(self, handle: str) -> None:
         """Release what belongs to a handle that is gone."""
@@ -184,14 +159,7 @@ class JsonLinesPublisher:
 
     def close(self) -> None:
         """Write the rest of a line if the pipe has room, and close the file."""
-        try:
-            if self._rest:
-                self._write()
-            self._flush()
-        finally:
-            if self._owned:
-                self._owned = False
-                os.close(self._fd)
+        self._output.close()
 
     def _body(self, msg: RobotStatusMsg) -> str:
         cached = self._bodies.get(msg.handle)
@@ -200,47 +168,3 @@ class JsonLinesPublisher:
         body = native_body(msg.handle, msg.status, msg.detail)
         self._bodies[msg.handle] = (msg.status, msg.detail, body)
         return body
-
-    def _writable(self) -> bool:
-        events = self._poll.poll(0)
-        if not events:
-            return False
-        if events[0][1] & (select.POLLERR | select.POLLHUP | select.POLLNVAL):
-            raise BrokenPipeError("the reader of the JSON lines has closed its end")
-        return True
-
-    def _collect(self, line: bytes) -> None:
-        """Collect a line. A replay writes many lines at once."""
-        self._lines.append(line)
-        self._waiting += len(line)
-        if self._waiting >= CHUNK:
-            self._flush()
-
-    def _flush(self) -> None:
-        data = memoryview(b"".join(self._lines))
-        self._lines.clear()
-        self._waiting = 0
-        while data:
-            done = self._put(data)
-            data = data[done:]
-            if not done:
-                self._poll.poll()
-
-    def _write(self) -> None:
-        """Write while the pipe has room, at most PIPE_BUF bytes at once, so that no write blocks."""
-        while self._rest and self._writable():
-            done = self._put(self._rest[:PIPE_BUF])
-            self._rest = self._rest[done:]
-            if not done:
-                return
-
-    def _put(self, data: bytes | memoryview) -> int:
-        """The number of bytes written; 0 if the pipe is full."""
-        try:
-            return os.write(self._fd, data)
-        except BlockingIOError:
-            return 0
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise LinkError(f"cannot write JSON lines to {self._path}: {error.strerror}") from None

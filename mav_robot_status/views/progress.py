@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from ..streams import visible
+
 if TYPE_CHECKING:
     from typing import TextIO
 
@@ -17,7 +19,7 @@ class ProgressLine:
 
     def __init__(self, stream: TextIO, what: str) -> None:
         self._stream = stream
-        self._what = "".join(character if character.isprintable() else "?" for character in what)
+        self._what = visible(what)
         self._shown = -1
         self._on = stream.isatty()
 

@@ -106,13 +106,6 @@ def test_standard_error_without_a_reader_does_no_harm(wire: Callable[..., Wire])
     assert process.returncode == 0
 
 
-def test_a_full_disk_is_one_line_and_exit_code_1(gateway: Callable[..., Gateway], wire: Callable[..., Wire]) -> None:
-    gate = gateway("udpin:127.0.0.1:0", "--json", "/dev/full")
-    wire(gate.address).beat()
-    assert gate.wait_for_end() == 1
-    assert gate.log[-1] == "mav-robot-status: cannot write JSON lines to /dev/full: No space left on device"
-
-
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

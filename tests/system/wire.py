@@ -32,6 +32,7 @@ class Wire:
     """The heartbeats of an ArduPilot rover; `beating` sends them from a thread."""
 
     def __init__(self, to: tuple[Any, ...] | None = None, system: int = 1, component: int = 1) -> None:
+        """Without `to` it sends to whoever sends to it first."""
         self.socket = socket.socket(socket.AF_INET6 if to and ":" in to[0] else socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("::1" if to and ":" in to[0] else "127.0.0.1", 0))
         self.socket.settimeout(0.05)
@@ -109,13 +110,14 @@ class Wire:
     def _listen(self) -> None:
         while not self._stop.is_set():
             try:
-                data = self.socket.recv(65535)
+                data, source = self.socket.recvfrom(65535)
             except OSError:  # nothing yet, or an earlier datagram found nobody
                 continue
             at = time.monotonic()
             if data == SETTLE:
                 self._settled.set()
                 continue
+            self.to = self.to or source
             with self._news:
                 self._heard += [Heard(at, message, data) for message in decode(data)]
                 self._news.notify_all()

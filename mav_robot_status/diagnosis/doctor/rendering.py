@@ -22,11 +22,13 @@ FEW_SOURCES = 4
 """Limit of addresses in the text. The JSON has all."""
 
 
-def as_text(f: Findings, diagnosis: Diagnosis) -> str:
-    """The diagnosis, the remarks and the next action."""
-    lines = [f"{f.words}: {diagnosis.matter} [{diagnosis.cause}]"]
-    lines += [f"  {line}" for line in remarks(f)]
-    return "\n".join([*lines, f"next: {diagnosis.next}"])
+def as_text(f: Findings, diagnosis: Diagnosis) -> list[str]:
+    """The diagnosis, the remarks and the next action, as lines."""
+    return [
+        f"{f.words}: {diagnosis.matter} [{diagnosis.cause}]",
+        *(f"  {line}" for line in remarks(f)),
+        f"next: {diagnosis.next}",
+    ]
 
 
 def as_json(f: Findings, diagnosis: Diagnosis) -> str:

@@ -8,6 +8,7 @@ import string
 from typing import TYPE_CHECKING, Final
 
 from ...errors import UsageError
+from ...interface.options import short
 
 if TYPE_CHECKING:
     from ...interface import RobotStatusMsg
@@ -23,20 +24,11 @@ class Naming:
     """A template like `agv-{serial}-{system}`. Raises UsageError for an invalid one."""
 
     def __init__(self, template: str, host: str | None = None, serials: tuple[str, ...] = SERIALS) -> None:
-        try:
-            self._used = {name for _, name, _, _ in string.Formatter().parse(template) if name is not None}
-            template.format_map(dict.fromkeys(PLACES, ""))
-        except (ValueError, KeyError, IndexError, AttributeError):
-            self._used = {"?"}
-        if self._used - set(PLACES):
-            known = ", ".join(f"{{{place}}}" for place in PLACES)
-            raise UsageError(f"mqtt: robot {template!r} is not a valid template; the placeholders are {known}")
+        self._used = places(template)
         self._template = template
         self._known = {"host": host if host is not None else socket.gethostname().partition(".")[0]}
         if "serial" in self._used:
             self._known["serial"] = _serial(serials)
-        if not level(template.format_map(dict.fromkeys(PLACES, "x"))):
-            raise UsageError(f"mqtt: robot {template!r} gives an empty name")
 
     def name(self, msg: RobotStatusMsg) -> str | None:
         """The robot's name, one level of a topic; None while a value of the template is unknown."""
@@ -44,6 +36,26 @@ class Naming:
         if any(value is None and place in self._used for place, value in of_vehicle.items()):
             return None
         return level(self._template.format_map({**of_vehicle, **self._known}))
+
+
+def places(template: str) -> frozenset[str]:
+    """The placeholders of a template. Raises UsageError for an invalid one.
+
+    A placeholder is a name alone. A format of Python can name a width of gigabytes, or an attribute: it is refused.
+    """
+    used = set()
+    try:
+        for _, name, form, conversion in string.Formatter().parse(template):
+            if name is not None:
+                used.add(name if name in PLACES and not (form or conversion) else "?")
+    except ValueError:
+        used.add("?")
+    if "?" in used:
+        known = ", ".join(f"{{{place}}}" for place in PLACES)
+        raise UsageError(f"mqtt: robot {short(template)} is not a valid template; the placeholders are {known}")
+    if not level(template.format_map(dict.fromkeys(PLACES, "x"))):
+        raise UsageError(f"mqtt: robot {short(template)} gives an empty name")
+    return frozenset(used)
 
 
 def level(text: str) -> str:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
+from ...interface.options import short
+from .naming import places
 from .options import DEFAULT_ROBOT, BrokerOptions, MqttOptions
 
 if TYPE_CHECKING:
@@ -58,11 +60,11 @@ class MqttSettings(NamedTuple):
 def read(given: Mapping[str, object], environment: Mapping[str, str] = os.environ) -> MqttSettings:
     """The settings of a publisher's mapping. Raises UsageError for a wrong option."""
     options = MqttOptions.read("mqtt", given)
+    robot = options.robot or DEFAULT_ROBOT
+    places(robot)
     broker = _broker(options, environment)
     spool = os.path.expanduser(options.spool or default_spool(broker, environment))
-    return MqttSettings(
-        broker, options.robot or DEFAULT_ROBOT, spool, int(options.spool_size * 1e6), options.spool_age * 86400
-    )
+    return MqttSettings(broker, robot, spool, int(options.spool_size * 1e6), options.spool_age * 86400)
 
 
 def read_broker(given: Mapping[str, object], environment: Mapping[str, str] = os.environ) -> Broker:
@@ -107,9 +109,9 @@ def _address(url: str) -> tuple[bool, str, int, str]:
         )
     prefix = parts.path.strip("/")
     if scheme not in PORTS or not host or parts.query or parts.fragment:
-        raise UsageError(f"mqtt: {url!r} is not a broker; write {EXAMPLE}, or mqtt:// without TLS")
+        raise UsageError(f"mqtt: {short(url, 200)} is not a broker; write {EXAMPLE}, or mqtt:// without TLS")
     if not prefix or prefix.startswith("$") or any(c in prefix for c in "+#\0") or len(prefix) > 200:
-        raise UsageError(f"mqtt: {url!r} has no prefix for the topics; write {EXAMPLE}, without +, # and $")
+        raise UsageError(f"mqtt: {short(url, 200)} has no prefix for the topics; write {EXAMPLE}, without +, # and $")
     return scheme == "mqtts", host, port or PORTS[scheme], prefix
 
 

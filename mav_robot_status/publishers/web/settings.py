@@ -9,6 +9,7 @@ from stat import S_IRGRP, S_IROTH, S_IWGRP, S_IWOTH
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...errors import LinkError, UsageError
+from ...interface.options import short
 from .options import DEFAULT_LISTEN, HttpOptions
 
 if TYPE_CHECKING:
@@ -55,9 +56,11 @@ def _address(text: str) -> tuple[str, int]:
     """`HOST:PORT`, `[IPv6]:PORT`, or a port on this computer."""
     host, _, port = text.rpartition(":")
     bare = host[1:-1] if host.startswith("[") and host.endswith("]") else host
-    if not (port.isascii() and port.isdigit() and int(port) <= 65535) or (":" in bare and bare == host):
+    if not (port.isascii() and port.isdigit() and len(port) <= 5 and int(port) <= 65535) or (
+        ":" in bare and bare == host
+    ):
         raise UsageError(
-            f"http: {text!r} is not an address to listen on; write HOST:PORT, for example {DEFAULT_LISTEN}"
+            f"http: {short(text, 200)} is not an address to listen on; write HOST:PORT, for example {DEFAULT_LISTEN}"
         )
     return bare or "127.0.0.1", int(port)
 

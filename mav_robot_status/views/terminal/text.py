@@ -5,6 +5,8 @@ from __future__ import annotations
 import unicodedata
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
+from ...streams import visible
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
@@ -41,11 +43,12 @@ ASCII: Final = Glyphs("*", "-", "?", ">", "x", "-", "~", utf8=False)
 
 
 def clean(text: object) -> str:
-    """Untrusted text as one line without control characters and without characters of zero width."""
-    if (known := str(text)).isascii() and known.isprintable():
+    """Untrusted text as one line of visible text without marks of zero width."""
+    known = visible(text)
+    if known.isascii():
         return known
     composed = unicodedata.normalize("NFC", known)
-    return "".join(c if c.isprintable() else " " for c in composed if unicodedata.category(c) not in ("Mn", "Me", "Cf"))
+    return "".join(c for c in composed if unicodedata.category(c) not in ("Mn", "Me"))
 
 
 def cells(text: str) -> int:

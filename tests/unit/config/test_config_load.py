@@ -43,7 +43,7 @@ CONTRACT = """\
     robot_status_controller:                            # any other top-level mapping with a type is a controller
       type: mav_robot_status/IndustrialRobotStatusController
       handle_name: industrial_robot_status_handle       # the default
-      publish_rate: 10                                  # Hz, the default; <= 0 publishes nothing periodically
+      publish_rate: 10                                  # Hz, the default; 0 publishes nothing periodically
       publish_on_change: true                           # the default
       publishers: [json, mavlink]                       # names, or mappings with a type and options
 """

@@ -142,8 +142,8 @@ def test_after_a_clock_jump_earlier_messages_are_ignored(tmp_path: Path) -> None
 def test_every_vehicle_of_a_log_is_explained(tmp_path: Path) -> None:
     found = explain_log(Config(), log_of(tmp_path / "a.tlog", 0, 1, systems=(1, 7)), None)
     assert [(one["system"], one["component"]) for one in found] == [(1, 1), (7, 1)]
-    assert [json.loads(line) for line in as_json(found).splitlines()] == found
-    assert [part.split()[1] for part in as_table(found).split("\n\n")] == ["1.1", "7.1"]
+    assert [json.loads(line) for line in as_json(found)] == found
+    assert [part.split()[1] for part in "\n".join(as_table(found)).split("\n\n")] == ["1.1", "7.1"]
 
 
 def test_a_log_without_an_autopilot_has_no_explanation(tmp_path: Path) -> None:
@@ -181,7 +181,7 @@ def test_an_explanation_has_the_values_of_the_line_at_that_moment(name: str) -> 
 
 def test_the_table_has_one_aligned_row_for_each_field(tmp_path: Path) -> None:
     found = explain_log(Config(), log_of(tmp_path / "a.tlog", 0, 1), "+0.5")
-    title, heading, *rows = as_table(found).splitlines()
+    title, heading, *rows = as_table(found)
     assert title == f"vehicle 1.1 (ARDUPILOTMEGA, GROUND_ROVER, MANUAL), CONNECTED, at {rfc3339(START_US + 500_000)}"
     assert heading.split() == ["field", "value", "age", "why"]
     assert [row.split()[0] for row in rows[:6]] == [field.name for field in STATES]

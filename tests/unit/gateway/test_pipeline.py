@@ -22,6 +22,7 @@ from mav_robot_status.interface import Audience, LinkState
 from mav_robot_status.mavlink.definitions import Heartbeat
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.framing import Frame, Parser
+from mav_robot_status.publishers.line_output import LineOutput
 from mav_robot_status.publishers.mqtt.journal import Journal
 
 from ..publishers.port import Port
@@ -135,9 +136,13 @@ def test_two_controllers_share_an_output_with_equal_options(installed: list[Coll
 
 @pytest.mark.parametrize("controllers", [1, 2])
 def test_mqtt_writes_its_spool_to_disk_before_other_outputs_publish(
-    stdout: TextIO, tmp_path: Path, controllers: int
+    stdout: TextIO, tmp_path: Path, controllers: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fails = PublisherConfig("json", {"path": "/dev/full"})
+    def fail(*_: object) -> None:
+        raise LinkError("cannot write JSON lines")
+
+    monkeypatch.setattr(LineOutput, "write", fail)
+    fails = PublisherConfig("json", {"path": str(tmp_path / "lines")})
     keeps = PublisherConfig("mqtt", {"url": "mqtt://127.0.0.1:1/robots", "spool": str(tmp_path / "s"), "robot": "r"})
     both = (controller("c", OURS, fails, keeps),)
     one_each = (controller("a", OURS, fails), controller("b", OURS, keeps))

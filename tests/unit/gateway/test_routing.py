@@ -9,7 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_robot_status.gateway.routing import MOST_FRAMES, MOST_ROUTES, SILENCE, WINDOW, Router
+from fuzz.routing import World
+from mav_robot_status.gateway.routing import (
+    AGAIN,
+    BEAT_PRESENT,
+    MOST_FRAMES,
+    MOST_ROUTES,
+    PRESENT,
+    REPEAT,
+    SILENCE,
+    WINDOW,
+    Router,
+)
 from mav_robot_status.mavlink.definitions import (
     Attitude,
     CommandAck,
@@ -102,6 +113,75 @@ GUIDE = [
 @pytest.mark.parametrize(("came_from", "sender", "message", "to"), [c[1:] for c in GUIDE], ids=[c[0] for c in GUIDE])
 def test_the_routing_guide(came_from: End, sender: tuple[int, int], message: NamedTuple, to: tuple[End, ...]) -> None:
     assert router().destinations(frame_of(message, *sender), came_from, ALL, 1.0) == to
+
+
+BEAT_OF_GROUND = Heartbeat(0, 6, 8, 0, 4, 3)
+THERE = (VEHICLE, CAMERA, OTHER)  # the vehicle links that may be sent to
+HEARD_TOO = [
+    # case: the message that VEHICLE passed on from a ground station, seconds ago; what comes from it on GROUND; to
+    ("its heartbeat comes from there", BEAT_OF_GROUND, 1.0, BEAT_OF_GROUND, (CAMERA, OTHER)),
+    ("its heartbeat comes no more from there", BEAT_OF_GROUND, BEAT_PRESENT + 0.01, BEAT_OF_GROUND, THERE),
+    ("the link was left minutes ago", BEAT_OF_GROUND, 200.0, BEAT_OF_GROUND, THERE),
+    ("only other messages come from there", ATTITUDE, 0.1, BEAT_OF_GROUND, THERE),
+    ("a broadcast while it comes from there", BEAT_OF_GROUND, 1.0, ATTITUDE, (CAMERA, OTHER)),
+    ("a broadcast when it comes no more from there", BEAT_OF_GROUND, PRESENT + 0.01, ATTITUDE, THERE),
+    ("a command is never held back", BEAT_OF_GROUND, 0.1, command(1, 1), (VEHICLE,)),
+    ("a command for the whole system is never held back", BEAT_OF_GROUND, 0.1, command(1, 0), (VEHICLE, CAMERA)),
+]
+
+
+@pytest.mark.parametrize(
+    ("passed_on", "ago", "message", "to"), [c[1:] for c in HEARD_TOO], ids=[c[0] for c in HEARD_TOO]
+)
+def test_a_frame_is_held_back_only_while_its_sender_still_comes_from_there(
+    passed_on: NamedTuple, ago: float, message: NamedTuple, to: tuple[End, ...]
+) -> None:
+    some = router()
+    for end, system, component in WHO_IS_WHERE:
+        some.heard(end, system, component, 500.0 - ago)
+    some.destinations(frame_of(passed_on, 255, 190), VEHICLE, ALL, 500.0 - ago)
+    found = some.destinations(frame_of(message, 255, 190, sequence=9), GROUND, ALL, 500.0)
+    assert tuple(end for end in found if not end.is_out) == to
+
+
+def test_a_ground_station_that_changes_its_way_is_not_silent_for_its_autopilot() -> None:
+    """It is heard through the autopilot for a minute, and then only on the out."""
+    some = router()
+    for second in range(60):
+        some.destinations(frame_of(BEAT_OF_GROUND, 255, 190, second), VEHICLE, ALL, float(second))
+    passed = [
+        second
+        for second in range(60, 80)
+        if VEHICLE in some.destinations(frame_of(BEAT_OF_GROUND, 255, 190, second), GROUND, ALL, second + 0.1)
+    ]
+    assert passed == list(range(61, 80))  # the autopilot had one at second 59
+
+
+def test_an_autopilot_does_not_get_its_own_telemetry_from_its_other_link() -> None:
+    radio, cable = End("radio"), End("cable")
+    ends = (radio, cable, GROUND)
+    some: Router[End] = Router()
+    some.destinations(frame_of(ATTITUDE), cable, ends, 1.0)
+    late = 1.0 + PRESENT + 1.0  # the cable is silent
+    assert some.destinations(frame_of(ATTITUDE, sequence=1), radio, ends, late) == (GROUND,)
+    some.heard(cable, 1, 100, late)  # something else of the vehicle is on the cable
+    assert some.destinations(frame_of(ATTITUDE, sequence=2), radio, ends, late + 1) == (cable, GROUND)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_heartbeat_is_late_and_no_loop_amplifies_in_an_hour_of_changing_ways(seed: int) -> None:
+    world = World(seed)
+    world.run(3600.0)
+    assert world.made > 10_000
+    assert world.sent > 5_000
+
+
+def test_the_status_of_a_telemetry_radio_is_forwarded_and_adds_no_route() -> None:
+    """It is never signed. Its ids may be forged."""
+    some = router()
+    (radio,) = Parser(None).feed(enclose(109, bytes(9), system=77, component=7, sequence=0))
+    assert some.destinations(radio, VEHICLE, ALL, 1.0) == (GROUND, TABLET, NOBODY)
+    assert some.destinations(frame_of(command(77, 7)), GROUND, ALL, 1.0) == ()
 
 
 @pytest.mark.parametrize("version", [1, 2])
@@ -200,6 +280,42 @@ def test_a_repeat_on_the_same_channel_is_forwarded() -> None:
     for i in range(50):
         assert some.destinations(frame_of(ATTITUDE), VEHICLE, ALL, 1.0 + i / 10) == (CAMERA, GROUND, TABLET, NOBODY)
     assert some.destinations(frame_of(ATTITUDE), GROUND, ALL, 1.0 + 50 / 10) == ()
+
+
+def test_a_frame_that_loops_back_to_its_first_channel_ends() -> None:
+    """Something beyond the channel sends each frame of a sender back, sooner or later than its next frame."""
+    for way in (0.004, 0.06, 0.4):
+        some = router()
+        sent: dict[int, int] = {}
+        due = [(i * 0.1, i) for i in range(100)]
+        while due:
+            due.sort()
+            now, number = due.pop(0)
+            if some.destinations(frame_of(ATTITUDE, 255, 190, number), GROUND, ALL, 1.0 + now):
+                sent[number] = sent.get(number, 0) + 1
+                due.append((now + way, number))
+        assert sum(sent.values()) <= 2.2 * 100
+        assert max(sent.values()) <= 3
+
+
+def test_a_sender_with_a_constant_sequence_number_may_alternate_its_messages() -> None:
+    some = router()
+    passed = [
+        bool(some.destinations(frame_of((ATTITUDE, command(1, 1))[i % 2]), GROUND, ALL, 1.0 + i * 0.6 * REPEAT))
+        for i in range(40)
+    ]
+    assert sum(passed) >= 38
+
+
+def test_a_sender_with_a_constant_sequence_number_on_two_ways_is_heard_every_second() -> None:
+    some = router()
+    passed = []
+    for second in range(20):
+        frame = frame_of(BEAT_OF_GROUND, 255, 190)
+        passed.append(bool(some.destinations(frame, GROUND, ALL, second + 0.0)))
+        assert some.destinations(frame, TABLET, ALL, second + 0.3) == ()
+    assert AGAIN < 0.7
+    assert all(passed)
 
 
 def test_the_same_bytes_much_later_are_not_a_copy() -> None:

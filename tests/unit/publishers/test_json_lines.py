@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
+import resource
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,7 +25,8 @@ from mav_robot_status.interface import (
     TriState,
     Vehicle,
 )
-from mav_robot_status.publishers.json_lines import PIPE_BUF, JsonLinesPublisher
+from mav_robot_status.publishers.json_lines import JsonLinesPublisher
+from mav_robot_status.publishers.line_output import PIPE_BUF, RETRY_FAILED
 
 from .port import Port
 
@@ -205,12 +208,136 @@ def test_a_file_is_appended_to_and_closed(tmp_path: Path) -> None:
     assert len(path.read_text("utf-8").splitlines()) == 2
 
 
-def test_a_full_disk_is_a_link_error() -> None:
-    publisher = JsonLinesPublisher(PublisherContext({"path": "/dev/full"}, Port(), io.StringIO()))
+def test_a_replay_on_a_full_disk_is_a_link_error() -> None:
+    publisher = to_file("/dev/full", patient=True)
+    publisher.publish(MSG)
     with pytest.raises(LinkError, match="cannot write JSON lines to /dev/full: No space left on device"):
-        publisher.publish(MSG)
-    publisher._rest = b""
+        publisher.close()
+
+
+def to_file(path: object, patient: bool = False, **options: Any) -> JsonLinesPublisher:
+    return JsonLinesPublisher(PublisherContext({"path": str(path), **options}, Port(), io.StringIO(), patient))
+
+
+@contextlib.contextmanager
+def room_for(size: int) -> Iterator[None]:
+    """No file of this process grows beyond `size` bytes (EFBIG)."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def at(seconds: float) -> Instant:
+    return Instant(NOW.mono + seconds, STAMP)
+
+
+def test_a_file_that_cannot_grow_has_whole_lines_only_and_grows_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "lines"
+    publisher = to_file(path)
+    publisher.publish(MSG)
+    whole = path.stat().st_size
+    with room_for(whole + 100):
+        for _ in range(3):
+            assert not publisher.busy()
+            publisher.publish(MSG)
+            assert publisher.service(at(0.0)) == at(RETRY_FAILED).mono
+            assert path.stat().st_size == whole
+    assert publisher.service(at(RETRY_FAILED - 0.1)) == at(RETRY_FAILED).mono
+    assert publisher.service(at(RETRY_FAILED)) is None
+    publisher.publish(MSG._replace(handle="other"))
     publisher.close()
+    lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+    assert [(line["handle"], line["seq"]) for line in lines] == [("robot", 0), ("robot", 3), ("other", 0)]
+    assert publisher.dropped == 2
+    assert caplog.messages == [
+        f"cannot write JSON lines to {path}: File too large; trying again",
+        f"writing {path} again; 2 lines are not in it",
+    ]
+
+
+def test_the_last_line_of_each_robot_waits_for_the_disk(tmp_path: Path) -> None:
+    """With changes only, the file would otherwise show an old status for hours."""
+    path = tmp_path / "lines"
+    path.symlink_to("/dev/full")
+    publisher = to_file(path, changes_only=True)
+    for handle in ("a", "b", "a"):
+        publisher.publish(MSG._replace(handle=handle))
+    publisher.service(NOW)
+    path.unlink()
+    assert publisher.service(at(RETRY_FAILED)) is None
+    written = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+    assert {(line["handle"], line["seq"]) for line in written} == {("a", 1), ("b", 0)}
+
+
+def test_a_disk_that_fails_again_and_again_is_told_once_a_minute(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "lines"
+    full = tmp_path / "full"
+    full.symlink_to("/dev/full")
+    path.symlink_to(full)
+    publisher = to_file(path)
+    for turn in range(24):
+        target = full if turn % 2 == 0 else tmp_path / "room"
+        path.unlink()
+        path.symlink_to(target)
+        if publisher.queued == 0:
+            publisher._output._close()  # type: ignore[union-attr]
+            publisher._output._open()  # type: ignore[union-attr]
+        publisher.publish(MSG)
+        publisher.service(at(turn * RETRY_FAILED))
+    told = [message for message in caplog.messages if message.startswith("cannot write")]
+    assert len(told) == 2  # in two minutes
+
+
+def test_a_file_that_ends_with_half_a_line_gets_a_newline_first(tmp_path: Path) -> None:
+    for patient in (False, True):
+        path = tmp_path / f"lines {patient}"
+        path.write_text('{"stamp": "20')
+        publisher = to_file(path, patient)
+        publisher.publish(MSG)
+        publisher.close()
+        torn, line = path.read_text("utf-8").splitlines()
+        assert torn == '{"stamp": "20'
+        assert json.loads(line)["seq"] == 0
+
+
+def test_a_fifo_whose_reader_leaves_waits_for_the_next_one(tmp_path: Path) -> None:
+    path = tmp_path / "fifo"
+    os.mkfifo(path)
+    first = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    publisher = to_file(path)
+    publisher.publish(MSG)
+    os.close(first)
+    for turn in range(3):
+        assert not publisher.busy()
+        publisher.publish(MSG)
+        publisher.service(at(turn * RETRY_FAILED))
+    second = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    publisher.service(at(3 * RETRY_FAILED))
+    assert [json.loads(line)["seq"] for line in os.read(second, 1 << 16).splitlines()] == [3]
+    os.close(second)
+    publisher.close()
+
+
+def test_standard_output_on_a_full_disk_is_tried_again(tmp_path: Path) -> None:
+    """A shell opened it without O_APPEND. Half a line is completed first."""
+    path = tmp_path / "lines"
+    with path.open("w", encoding="utf-8") as stdout:
+        publisher = JsonLinesPublisher(PublisherContext({}, Port(), stdout))
+        with room_for(100):
+            for _ in range(3):
+                publisher.publish(MSG)
+                publisher.service(NOW)
+        publisher.service(at(RETRY_FAILED))
+        publisher.publish(MSG)
+        publisher.close()
+    assert [json.loads(line)["seq"] for line in path.read_text("utf-8").splitlines()] == [0, 2, 3]
 
 
 @pytest.mark.parametrize(

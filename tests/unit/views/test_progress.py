@@ -35,7 +35,7 @@ def test_the_bar_is_drawn_once_for_each_per_cent() -> None:
     assert terminal.getvalue().count("%") == 101
 
 
-def test_control_characters_in_a_name_are_replaced() -> None:
+def test_control_characters_in_a_name_are_shown_by_their_codes() -> None:
     terminal = Terminal()
     ProgressLine(terminal, "a\033[2J\n.tlog")(0.0)
-    assert terminal.getvalue().startswith("a?[2J?.tlog")
+    assert terminal.getvalue().startswith(r"a\u001b[2J\u000a.tlog")

@@ -184,7 +184,7 @@ def test_px4_without_a_ground_station_is_reported_to_send_no_texts() -> None:
 
 def test_the_text_lists_only_a_few_of_many_addresses() -> None:
     f = heard(ROVER, sources=tuple(f"10.0.0.{i}:5" for i in range(9)))
-    assert "from 10.0.0.0:5, 10.0.0.1:5, 10.0.0.2:5, 10.0.0.3:5, ...;" in as_text(f, diagnose(f))
+    assert "from 10.0.0.0:5, 10.0.0.1:5, 10.0.0.2:5, 10.0.0.3:5, ...;" in "\n".join(as_text(f, diagnose(f)))
 
 
 def ardupilot(e_stopped: bool | None, applet: AppletReport | None) -> Speaker:
@@ -215,4 +215,4 @@ def test_the_applet_is_advised_where_it_would_make_e_stopped_known(
 
 def test_the_applet_is_not_mentioned_for_an_autopilot_that_cannot_run_it() -> None:
     unknown = ROVER._replace(status=STATUS._replace(fields={**STATUS.fields, "e_stopped": None}))
-    assert "applet" not in as_text(heard(unknown), diagnose(heard(unknown)))
+    assert "applet" not in "\n".join(as_text(heard(unknown), diagnose(heard(unknown))))

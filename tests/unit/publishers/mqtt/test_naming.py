@@ -33,7 +33,23 @@ def test_a_name_is_one_level_of_a_topic() -> None:
     assert len(Naming("{handle}").name(msg(handle="x" * 500)) or "") == 100
 
 
-@pytest.mark.parametrize("template", ["{color}", "{system.real}", "{0}", "{", "{system!q}", ""])
+@pytest.mark.parametrize(
+    "template",
+    [
+        "{color}",
+        "{system.real}",
+        "{0}",
+        "{",
+        "{system!q}",
+        "{system!r}",
+        "{handle:>2000000000}",
+        "{handle:{system}}",
+        "{handle.__class__}",
+        "{handle[0]}",
+        "{}",
+        "",
+    ],
+)
 def test_an_invalid_template_is_an_error(template: str) -> None:
     with pytest.raises(UsageError, match="robot"):
         Naming(template)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 Address = Hashable
 """The source of received bytes. Each connection of a stream has an address of its own, so that the bytes of two
@@ -15,6 +15,15 @@ class Received(NamedTuple):
 
     data: bytes
     source: Address
+
+
+class Dated(NamedTuple):
+    """A datagram with the time of its arrival."""
+
+    data: bytes
+    source: Address
+    stamp: int | None
+    """Microseconds since 1970 on the clock of the kernel; None: not known."""
 
 
 class Link(Protocol):
@@ -59,3 +68,11 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Close the sockets or the device. May be called again."""
+
+
+@runtime_checkable
+class DatedLink(Protocol):
+    """What a link can offer besides `Link`: the arrival times of datagrams that were not read at once."""
+
+    def receive_dated(self, limit: int = 64) -> list[Dated]:
+        """As `receive`, with stamps. It takes longer, so it is called only if input may be old."""

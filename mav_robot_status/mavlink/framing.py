@@ -30,11 +30,11 @@ STAMP = struct.Struct(">Q").unpack_from  # precedes each frame of a recorded log
 STAMP_SIZE: Final = 8
 LATE = 240  # a gap this long means a frame up to 16 places late, or a duplicate; not 240 lost frames
 CHECK: Final = 24
-"""Bytes that must have been read for each check of a place at which a frame may start. In random bytes there is one such
-place in 350 bytes. Beyond that a search looks at some of the places only."""
+"""Bytes that must have been read for each check of a place at which a frame may start. Random bytes have one such place
+in 350 bytes. Where there are many more, a search looks at some of them only."""
 SKIP: Final = 12
-"""Bytes that must have been read for each skipped frame without a valid CRC. The shortest frame of MAVLink 2 has as many,
-so frames of an unknown dialect are always skipped whole."""
+"""Bytes that must have been read for each skipped frame without a valid CRC. The shortest frame of MAVLink 2 has as
+many, so frames of an unknown dialect are always skipped whole."""
 MOST_CREDIT, FIRST_CREDIT = 6144, 768
 """Unspent bytes that are kept for later checks, and those that a new parser has. A damaged frame may consist of places
 at which a frame may start; all of them are checked. A new parser has fewer, because each new address gets a parser."""
@@ -310,7 +310,7 @@ class Parser:
         the range; they are paid for. If a check cannot be paid for, the search goes on where it can.
         """
         size = len(data)
-        open_ = []
+        open_: list[tuple[int, int]] = []
         for place in known:
             at, needed = place
             if needed <= size:
@@ -348,7 +348,7 @@ class Parser:
         if effect < 0:
             return WRONG
         end = i + header + length
-        needed = end + (15 if flags and flags & SIGNED else 2)
+        needed: int = end + (15 if flags and flags & SIGNED else 2)
         if needed > size:
             return needed
         crc = crc_hqx(reversed_data[i:end], seed) ^ effect

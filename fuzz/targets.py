@@ -16,10 +16,14 @@ from mav_robot_status.hardware.mavlink.state import text_assembly
 from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
 from mav_robot_status.mavlink.encode import enclose
-from mav_robot_status.mavlink.framing import Frame, Parser
+from mav_robot_status.mavlink.framing import CHECK, FIRST_CREDIT, Frame, Parser
 from mav_robot_status.mavlink.signing import Signer, Verifier, is_signed
 from mav_robot_status.mavlink.wire import MAX_FRAME
 
+from .mutate import MOST_BYTES
+from .work import checks, cut
+
+SHORTEST_FRAME: Final = 8
 PIECE: Final = 97
 """Bytes of one feed, so that feeds end anywhere within a frame."""
 KEY: Final = bytes(32)
@@ -45,6 +49,15 @@ def framing(data: bytes) -> int:
     return (
         counters.frames + counters.incompatible + sum(counters.bad_crc.values()) + sum(counters.unknown.values()) or 1
     )
+
+
+def work(data: bytes) -> int:
+    """Any bytes in pieces of any size: the parser computes few CRCs for each byte. A unit is a byte."""
+    for piece in (1, PIECE, MOST_BYTES):
+        number, total = checks(cut(data, piece))
+        assert number <= 3 * (len(data) + FIRST_CREDIT) / CHECK + len(data) / SHORTEST_FRAME + 1, number
+        assert total <= MAX_FRAME * number
+    return max(len(data), 1)
 
 
 def messages(data: bytes) -> int:
@@ -133,12 +146,18 @@ def _one_line(error: Exception) -> None:
 
 TARGETS: Final[dict[str, Callable[[bytes], int]]] = {
     "framing": framing,
+    "work": work,
     "messages": messages,
     "signing": signing,
     "texts": texts,
     "configuration": configuration,
     "connection": connection,
 }
-UNITS: Final = {"configuration": "configurations", "connection": "connection strings", "texts": "chunks"}
+UNITS: Final = {
+    "work": "bytes",
+    "configuration": "configurations",
+    "connection": "connection strings",
+    "texts": "chunks",
+}
 
 assert set(SOME) <= set(MESSAGES)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import random
 import sys
 import time
+from binascii import crc_hqx
 from typing import TYPE_CHECKING, Any, Final
 from unittest import mock
 
@@ -61,7 +62,7 @@ SHAPES: Final[dict[str, bytes]] = {
 def checks(pieces: Sequence[bytes]) -> tuple[int, int]:
     """How many CRCs the parser computes of these pieces of a stream, and of how many bytes in total."""
     lengths: list[int] = []
-    crc = framing.crc_hqx
+    crc = crc_hqx
 
     def counted(data: Any, seed: int) -> int:
         lengths.append(len(data))

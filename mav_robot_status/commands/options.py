@@ -94,9 +94,9 @@ def seconds(text: str) -> float:
 def gap(text: str) -> float:
     """Seconds of silence in a log."""
     with contextlib.suppress(ValueError):
-        if 0 <= (silence := float(text)) <= 1e9:
+        if 0 <= (silence := float(text)) <= 86400:
             return silence
-    raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 1e9")
+    raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 86400")
 
 
 def system(text: str) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,7 +17,7 @@ HEARTBEAT = Heartbeat(0, 10, 3, 65, 4, 3)
 RECORDINGS = sorted((Path(__file__).parents[2] / "recorded" / "logs").glob("*.tlog"))
 
 
-def sent(message: object, component: int = 1) -> bytes:
+def sent(message: Any, component: int = 1) -> bytes:
     return encode(message, system=1, component=component, sequence=0)
 
 

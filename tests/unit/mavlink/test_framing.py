@@ -438,8 +438,9 @@ def test_a_stream_in_small_pieces_is_not_searched_again_with_each_piece() -> Non
 def test_a_valid_frame_behind_any_flood_is_found() -> None:
     for name, data in SHAPES.items():
         for size in (300, 5000, SIZE):
-            (*_, last), _ = feed(data[:size] + bytes(40) + heartbeat(1) + heartbeat(2), heartbeat(3))
-            assert last.sequence == 3, name
+            # the flood may end in a header that claims one frame's length at most
+            frames, _ = feed(data[:size], *(heartbeat(i) for i in range(30)))
+            assert [frame.sequence for frame in frames][-10:] == list(range(20, 30)), name
 
 
 def test_a_damaged_frame_full_of_magic_bytes_hides_no_frame() -> None:

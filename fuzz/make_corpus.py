@@ -6,6 +6,7 @@ import random
 import struct
 from pathlib import Path
 
+from fuzz.work import SHAPES
 from mav_robot_status.links.url import KINDS
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
 from mav_robot_status.mavlink.encode import encode
@@ -51,6 +52,7 @@ def main() -> None:
     signer = Signer(bytes(range(32)), 3)
     signed = [signer.sign(frame, 1_800_000_000_000_000 + 10 * i) for i, frame in enumerate(frames(2))]
     write("framing", [b"".join(frames(1)), b"".join(frames(2)), b"".join(signed[:8]), *frames(2)[:6]])
+    write("work", [shape[:1500] for shape in SHAPES.values()])
     write("signing", [b"".join(signed[:8]), *signed[:4], b"".join(frames(2)[:4])])
     heartbeat = struct.pack("<IBBBBB", 4, 2, 3, 209, 4, 3)
     heartbeats = [bytes([8, 16, number % 3, number]) + heartbeat[: 9 - number % 4] for number in range(60)]

@@ -16,12 +16,15 @@ from mav_robot_status.hardware.mavlink.state import text_assembly
 from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
 from mav_robot_status.mavlink.encode import enclose
-from mav_robot_status.mavlink.framing import Frame, Parser
+from mav_robot_status.mavlink.framing import CHECK, FIRST_CREDIT, Frame, Parser
 from mav_robot_status.mavlink.signing import Signer, Verifier, is_signed
 from mav_robot_status.mavlink.wire import MAX_FRAME
 
+from .mutate import MOST_BYTES
 from .routing import World
+from .work import checks, cut
 
+SHORTEST_FRAME: Final = 8
 PIECE: Final = 97
 """Bytes of one feed, so that feeds end anywhere within a frame."""
 KEY: Final = bytes(32)
@@ -47,6 +50,15 @@ def framing(data: bytes) -> int:
     return (
         counters.frames + counters.incompatible + sum(counters.bad_crc.values()) + sum(counters.unknown.values()) or 1
     )
+
+
+def work(data: bytes) -> int:
+    """Any bytes in pieces of any size: the parser computes few CRCs for each byte. A unit is a byte."""
+    for piece in (1, PIECE, MOST_BYTES):
+        number, total = checks(cut(data, piece))
+        assert number <= 3 * (len(data) + FIRST_CREDIT) / CHECK + len(data) / SHORTEST_FRAME + 1, number
+        assert total <= MAX_FRAME * number
+    return max(len(data), 1)
 
 
 def messages(data: bytes) -> int:
@@ -142,6 +154,7 @@ def _one_line(error: Exception) -> None:
 
 TARGETS: Final[dict[str, Callable[[bytes], int]]] = {
     "framing": framing,
+    "work": work,
     "messages": messages,
     "signing": signing,
     "texts": texts,
@@ -149,6 +162,11 @@ TARGETS: Final[dict[str, Callable[[bytes], int]]] = {
     "connection": connection,
     "routing": routing,
 }
-UNITS: Final = {"configuration": "configurations", "connection": "connection strings", "texts": "chunks"}
+UNITS: Final = {
+    "work": "bytes",
+    "configuration": "configurations",
+    "connection": "connection strings",
+    "texts": "chunks",
+}
 
 assert set(SOME) <= set(MESSAGES)

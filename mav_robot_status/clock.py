@@ -15,14 +15,15 @@ class Instant(NamedTuple):
     """One moment on two clocks."""
 
     mono: float
-    """Seconds on a clock that never steps. All durations use it."""
+    """Seconds on a clock that never steps, and that goes on while the system is suspended. All durations use it."""
     unix_us: int
     """Microseconds since 1970 in UTC. Only time stamps use it."""
 
 
 def now() -> Instant:
     """The present time, for the live gateway. A log has its own instants."""
-    return tuple.__new__(Instant, (time.monotonic(), time.time_ns() // 1000))  # called in every turn of the live loop
+    # called in every turn of the live loop
+    return tuple.__new__(Instant, (time.clock_gettime(time.CLOCK_BOOTTIME), time.time_ns() // 1000))
 
 
 def later(start: Instant, seconds: float) -> Instant:

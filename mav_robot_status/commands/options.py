@@ -91,6 +91,14 @@ def seconds(text: str) -> float:
     raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 3600")
 
 
+def gap(text: str) -> float:
+    """Seconds of silence in a log."""
+    with contextlib.suppress(ValueError):
+        if 0 <= (silence := float(text)) <= 86400:
+            return silence
+    raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 86400")
+
+
 def system(text: str) -> int:
     """A MAVLink system id, 1 to 255."""
     return _number(text, "a system id", 255)

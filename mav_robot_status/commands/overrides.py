@@ -47,6 +47,7 @@ def overridden(config: Config, options: Namespace) -> Config:
     for kind in WITH_ARGUMENTS:
         controllers = with_publisher(kind, controllers, options)
     record = value_of(options, "--record")
+    max_gap = value_of(options, "--max-gap")
     return dataclasses.replace(
         config,
         links=_links(config, options),
@@ -54,6 +55,7 @@ def overridden(config: Config, options: Namespace) -> Config:
         controllers=controllers,
         signing=_signing(config.signing, options.signing_key),
         record=config.record if record is None else record,
+        max_gap=config.max_gap if max_gap is None else max_gap,
         forward=config.forward or bool(value_of(options, "--forward")),
     )
 

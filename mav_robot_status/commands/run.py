@@ -11,7 +11,7 @@ from ..publishers.json_lines import JsonOptions
 from ..publishers.mqtt.options import MqttOptions
 from ..publishers.web.options import HttpOptions
 from . import PROGRAM
-from .options import baud, connections, publisher, rate, system, verbosity
+from .options import baud, connections, gap, publisher, rate, system, value_of, verbosity
 from .overrides import configured
 
 if TYPE_CHECKING:
@@ -35,6 +35,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     publisher(parser, MqttOptions)
     parser.add_argument("--forward", action="store_true", help="forward every frame between the links and the outs")
     parser.add_argument("--passive", action="store_true", help="never send on the vehicle links")
+    parser.add_argument("--raw", action="store_true", help="the log is a raw capture of MAVLink, without time stamps")
+    parser.add_argument(
+        "--max-gap", type=gap, metavar="S", help="a longer silence in a log, once lost, is one line (60)"
+    )
     verbosity(parser)
 
 
@@ -43,11 +47,12 @@ def run(options: argparse.Namespace) -> int:
     config = configured(options)
     log = _log(config)
     if log is None:
+        _check_live(options)
         return _live(config, options)
     _check_replay(config, options, log)
     from ..gateway.replay import replay
 
-    replay(config, log, sys.stdout)
+    replay(config, log, sys.stdout, raw=options.raw)
     return 0
 
 
@@ -75,6 +80,12 @@ def _again(options: argparse.Namespace) -> Config:
     if log := _log(config):
         raise UsageError(f"{log}: a recorded log is replayed alone, with a separate command")
     return config
+
+
+def _check_live(options: argparse.Namespace) -> None:
+    for option in ("--raw", "--max-gap"):
+        if value_of(options, option):
+            raise UsageError(f"{option} is for a recorded log; write for example {PROGRAM} flight.tlog {option}")
 
 
 def _check_replay(config: Config, options: argparse.Namespace, log: str) -> None:

@@ -125,6 +125,8 @@ class Config:
     """None: nothing is signed or verified."""
     coalesce: Annotated[float, Within(0.0, 1.0, "s")] = 0.0
     """Seconds to wait for more input before reading: fewer wake-ups, more delay."""
+    max_gap: Annotated[float, Within(0.0, 86400.0, "s")] = 60.0
+    """A longer silence of a recorded log, after the link is lost, gives one line."""
     forward: bool = False
     """Forward every frame between the links and the outs, by MAVLink's routing rules."""
     record: Annotated[str | None, Or("none")] = None

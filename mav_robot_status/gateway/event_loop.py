@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
 from ..errors import MavRobotStatusError
+from .arrival import LATE, STALL
 from .controller_config import check
 from .live_hardware import LiveHardware
 from .metrics import metrics
@@ -37,7 +38,9 @@ PACE: Final = 0.002
 BURST: Final = 8 * PACE
 """Eight wake-ups may follow each other without a pause, so single messages and short bursts are not delayed."""
 MOST_AT_ONCE: Final = 1024
-"""Datagrams read in one wake-up. Enough for a full socket buffer; bounded, so that a flood does not stop the rest."""
+"""Datagrams of usual length read in one wake-up of each link; bounded, so that a flood does not stop the rest."""
+MOST_AFTER_PAUSE: Final = 8 * MOST_AT_ONCE
+"""The same after a pause. Enough for a full socket buffer: it should be read before the next status."""
 
 
 class EventLoop:
@@ -104,7 +107,7 @@ class EventLoop:
 
         Raises BrokenPipeError if the reader of the JSON lines is gone.
         """
-        now = self._clock()
+        now = looked = self._clock()
         poll = self._new_poll()
         due, next_due = -math.inf, self.hardware.all.next_due
         self._notifier.ready()
@@ -131,12 +134,24 @@ class EventLoop:
                 now = self._clock()
                 if events:
                     limit = self._limit(now.mono)
+                    if now.mono - looked.mono > LATE:
+                        limit = self._look_late(looked, now, wait)
                     for descriptor, _ in events:
                         source = self._polled.get(descriptor)
                         if source is not None:
                             source.receive(now, limit)
+                looked = now
         finally:
             self.close()
+
+    def _look_late(self, looked: Instant, now: Instant, wait: float) -> int:
+        """Tell the links that their input may be old, and how many datagrams to read.
+
+        `looked` is the instant of the last look at the links, `wait` how many seconds the loop wanted to wait.
+        """
+        stalled = now.mono - looked.mono > max(wait, 0.0) + STALL
+        self.hardware.mavlink.hub.pause(looked, now, stalled=stalled)
+        return MOST_AFTER_PAUSE if stalled else MOST_AT_ONCE
 
     def turn(self, now: Instant) -> None:
         """Do everything that is due at `now`."""

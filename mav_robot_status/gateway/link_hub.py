@@ -13,6 +13,7 @@ from ..hardware.mavlink.message_table import COMMAND_IDS, WANTED_IDS
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
 from ..mavlink.signing import ACCEPTED, Verdict
+from .arrival import BATCH, USUAL, Arrivals, Pause
 from .endpoint import Endpoint
 from .path_selection import PathSelection
 from .routing import Router
@@ -34,8 +35,6 @@ log = logging.getLogger(__name__)
 
 NONE: Final[frozenset[tuple[int, int]]] = frozenset()
 REQUEST_SIZE: Final = 45  # bytes of a COMMAND_LONG
-BATCH: Final = 64
-"""Pieces read before parsing. Bounds the memory in a flood of long pieces."""
 SETUP_SIGNING: Final = 256
 """This message contains a key. It is never recorded or forwarded."""
 
@@ -55,6 +54,9 @@ class LinkHub:
         """True if something was received that needs a turn at once. The hardware interface resets it."""
         self.conflicts: set[tuple[int, int]] = set()
         """Ids that two autopilots claim, found since the last turn."""
+        self.arrivals = Arrivals()
+        self.late = False
+        """Whether `receive_late` has to be used: some input may be old."""
         self.endpoints: list[Endpoint] = []
         self._requests: set[tuple[Channel, int]] = set()
         self._channels: tuple[Channel, ...] | None = None
@@ -106,24 +108,31 @@ class LinkHub:
             for endpoint in endpoints:
                 steps.callback(endpoint.link.close)
                 steps.callback(endpoint.log_counters)
+                self.arrivals.forget(endpoint)
 
     # receiving
 
-    def receive(self, endpoint: Endpoint, now: Instant, limit: int = BATCH) -> list[tuple[Frame, Channel]]:
+    def receive(
+        self,
+        endpoint: Endpoint,
+        now: Instant,
+        limit: int = BATCH,
+        read: Callable[[int], Sequence[tuple[bytes, Address]]] | None = None,
+    ) -> list[tuple[Frame, Channel]]:
         """Receive on a link. Returns the frames that a status needs, each with its channel.
 
-        Reads at most `limit` datagrams, or BATCH pieces of a stream. A limit of 1 makes a single system call.
+        Reads at most `limit` datagrams of USUAL bytes, or BATCH pieces of a stream. A limit of 1 makes a single system
+        call. `read` replaces the `receive` of the link.
         """
         heard: list[tuple[Frame, Channel]] = []
         link = endpoint.link
-        while limit > 0:
-            pieces: Sequence[tuple[bytes, Address]] = link.receive(limit if limit < BATCH else BATCH)
-            limit = limit - BATCH if len(pieces) == BATCH and not link.stream else 0
+        read = read or link.receive
+        while True:
+            pieces = read(limit if limit < BATCH else BATCH)
             if self._observers:
                 self._observe(pieces, now)
-            if len(pieces) > 1 and not self._keep_all:
-                pieces = _joined(pieces)
-            for data, source in pieces:
+            whole = _joined(pieces) if len(pieces) > 1 and not self._keep_all else pieces
+            for data, source in whole:
                 channel = endpoint.channel(source)
                 frames = channel.parser.feed(data)
                 if self._keep_all:
@@ -137,9 +146,32 @@ class LinkHub:
                 for frame in frames:
                     if self._accepts(frame, channel, now):
                         heard.append((frame, channel))
+            if len(pieces) < BATCH:
+                break
+            limit = 0 if link.stream else limit - max(BATCH, sum(len(data) for data, _ in pieces) // USUAL)
+            if limit <= 0:
+                self.late = self.arrivals.left(endpoint, pieces, now)
+                break
         if link.stream and link.due() <= now.mono:  # the connection has ended
             self.needs_turn = True
         return heard
+
+    def receive_late(
+        self, endpoint: Endpoint, now: Instant, limit: int
+    ) -> list[tuple[Instant, list[tuple[Frame, Channel]]]]:
+        """As `receive`, for input that may be old: groups of frames, each with the time of its arrival."""
+        groups, self.late = self.arrivals.receive(endpoint, now, limit)
+        found = []
+        for at, piece in groups:
+            given = [piece]
+            found.append((at, self.receive(endpoint, at, 1, lambda _, given=given: given)))  # type: ignore[misc]
+        self.needs_turn = True
+        return found
+
+    def pause(self, since: Instant, now: Instant, *, stalled: bool) -> None:
+        """The look at the links at `now` is late, see `arrival.Pause`."""
+        self.arrivals.pause = Pause(since, now, stalled)
+        self.late = True
 
     def _observe(self, pieces: Sequence[tuple[bytes, Address]], now: Instant) -> None:
         for observer in self._observers:

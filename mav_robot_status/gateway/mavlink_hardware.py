@@ -50,6 +50,9 @@ class MavlinkHardware:
         self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
         self.changed = False
         self.observers = observers
+        self._waiting: list[tuple[Instant, Frame, Channel]] = []
+        """Frames that arrived before they were read, with their times. The next `read` takes them in order."""
+        self._read_at = -math.inf
         self._heartbeat_due = AT_ONCE
         self._timer_due = AT_ONCE
         """The first of `_heartbeat_due` and `_silent_at`."""
@@ -90,6 +93,29 @@ class MavlinkHardware:
         """The links."""
         return self._sources
 
+    def receive_late(self, endpoint: Endpoint, now: Instant, limit: int) -> None:
+        """Receive on a link whose input may be old."""
+        for at, heard in self.hub.receive_late(endpoint, now, limit):
+            self._waiting += [(at, frame, channel) for frame, channel in heard]
+
+    def _take_waiting(self) -> None:
+        """Process the frames of all links in the order of their arrival, as if they had been read at once.
+
+        Time does not go back: a frame older than the last `read` is left out.
+        """
+        waiting, self._waiting = sorted(self._waiting, key=lambda frame: frame[0].mono), []
+        vehicles = self.vehicles
+        for at, frame, channel in waiting:
+            if at.mono < self._read_at:
+                continue
+            if vehicles.deadline < at.mono:
+                vehicles.read(at)
+            vehicle = vehicles.take(frame, at)
+            if vehicle is not None and vehicle.ids is not None:
+                self.hub.heard_vehicle(vehicle.ids, channel, at.mono)
+            if self.observers:
+                self.observe([(frame, channel)], at)
+
     def observe(self, heard: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
         """Pass the frames of vehicles to the observers."""
         for observer in self.observers:
@@ -103,6 +129,9 @@ class MavlinkHardware:
         """Update the handles to `now`."""
         hub, vehicles = self.hub, self.vehicles
         hub.needs_turn = False
+        if self._waiting:
+            self._take_waiting()
+        self._read_at = now.mono
         while hub.conflicts:
             vehicles.conflict(hub.conflicts.pop(), now)
         vehicles.read(now)
@@ -179,6 +208,9 @@ class LinkSource:
 
     def receive(self, now: Instant, limit: int) -> None:
         """Read the pending input, and process its frames."""
+        if self._hub.late:
+            self._hardware.receive_late(self._endpoint, now, limit)
+            return
         heard = self._hub.receive(self._endpoint, now, limit)
         if not heard:
             return

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import later
+from ..interface import LinkState
 from .live_hardware import combined, open_interface
 from .mavlink_hardware import robot_hw
 from .pipeline import NEVER, Pipeline
@@ -43,9 +44,12 @@ class NoMavlinkPort:
         """Send nothing."""
 
 
-def replay(config: Config, path: str, stdout: TextIO) -> None:
-    """Replay the log at `path`. Raises UsageError if it cannot be read, BrokenPipeError if stdout is closed."""
-    recording = Recording(path)
+def replay(config: Config, path: str, stdout: TextIO, *, raw: bool = False) -> None:
+    """Replay the log at `path`, `raw`: without time stamps.
+
+    Raises UsageError if it cannot be read, BrokenPipeError if stdout is closed.
+    """
+    recording = Recording(path, raw)
     log.info("replaying %s", path)
     pipeline = ReplayPipeline(config, stdout)
     try:
@@ -63,7 +67,12 @@ class ReplayPipeline(Pipeline):
         self.vehicles = robot_hw(config)
         others = [open_interface(interface, replay=True, clock=lambda: self.now) for interface in config.interfaces]
         hw = combined(self.vehicles, others)
+        self.max_gap = config.max_gap
         super().__init__(config, hw, NoMavlinkPort(), stdout, patient=True, observers=observers)
+
+    def hears_nothing(self) -> bool:
+        """Whether every vehicle is lost, or was never heard."""
+        return all(handle.detail.link is not LinkState.CONNECTED for handle in self.hw.handles)
 
     def close(self, now: Instant) -> None:
         """Stop the controllers; close the publishers and the hardware."""
@@ -100,8 +109,11 @@ def run_through(pipeline: ReplayPipeline, recording: Iterable[Stamped]) -> Insta
     return last
 
 
-def run_until(pipeline: Pipeline, last: Instant, until: Instant) -> None:
-    """Tick at every due time between two records, as a live gateway does."""
+def run_until(pipeline: ReplayPipeline, last: Instant, until: Instant) -> None:
+    """Tick at every due time between two records, as a live gateway does.
+
+    Ends at the loss of all vehicles if the rest is longer than `max_gap`: every further line would be the same.
+    """
     moment = last
     overdue = 0
     while (due := pipeline.next_due(moment.mono)) < until.mono and overdue <= MOST_OVERDUE:
@@ -109,3 +121,5 @@ def run_until(pipeline: Pipeline, last: Instant, until: Instant) -> None:
         if due > moment.mono:
             moment = later(last, due - last.mono)._replace(mono=due)
         pipeline.tick(moment)
+        if until.mono - moment.mono > pipeline.max_gap and pipeline.hears_nothing():
+            break

@@ -17,6 +17,15 @@ class Received(NamedTuple):
     source: Address
 
 
+class Dated(NamedTuple):
+    """A datagram with the time of its arrival."""
+
+    data: bytes
+    source: Address
+    stamp: int | None
+    """Microseconds since 1970 on the clock of the kernel; None: not known."""
+
+
 class Link(Protocol):
     """One open link. No method blocks, and no method raises because of the peer.
 
@@ -67,3 +76,11 @@ class ServesClients(Protocol):
 
     is_active: Callable[[Address], bool]
     """Whether valid frames arrive from a client. The owner of the link sets it: a link knows no frames."""
+
+
+@runtime_checkable
+class DatedLink(Protocol):
+    """What a link can offer besides `Link`: the arrival times of datagrams that were not read at once."""
+
+    def receive_dated(self, limit: int = 64) -> list[Dated]:
+        """As `receive`, with stamps. It takes longer, so it is called only if input may be old."""

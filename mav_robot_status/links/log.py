@@ -6,9 +6,13 @@ and have stamps of a clock that was set during the flight.
 
 from __future__ import annotations
 
+import os
+import select
+import stat
+import weakref
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import UsageError
@@ -19,9 +23,21 @@ clock that is set was wrong by minutes to decades. Time never stands still for l
 DAY_US = 86_400_000_000
 """A longer step forward means that the clock was set. A shorter one is silence, and is replayed as silence."""
 
-_LATEST = 1 << 51  # microseconds, in 2041
+LATEST: Final = 1 << 51
+"""The latest plausible stamp, microseconds since 1970: in 2041."""
 BLOCK = 1 << 13
 """Bytes of one block: few enough that the objects made of it do not trigger a run of the garbage collector."""
+
+CHUNK: Final = 1 << 18
+"""Bytes of one read."""
+PATIENCE: Final = 5.0
+"""Seconds to wait until something is written to a pipe."""
+OTHER_FILES: Final = {
+    b"\xa3\x95": "a DataFlash log (.bin) of ArduPilot, which holds no MAVLink; replay the .tlog of the ground station",
+    b"ULog\x01\x12\x35": "a flight log (.ulg) of PX4, which holds no MAVLink; replay the .tlog of the ground station",
+    b"\x1f\x8b": "compressed with gzip; unpack it first: gunzip FILE",
+}
+"""Files that are taken for recorded logs, by their first bytes."""
 
 new = tuple.__new__  # makes a NamedTuple of a tuple in a third of the time of its constructor
 
@@ -118,7 +134,7 @@ class _Clock:
 
 def follows(earlier: int, later: int) -> bool:
     """Whether two stamps (microseconds) can be neighbours if the clock was not set between them."""
-    return 0 <= later < _LATEST and -SMALL_STEP_US <= later - earlier <= DAY_US
+    return 0 <= later < LATEST and -SMALL_STEP_US <= later - earlier <= DAY_US
 
 
 def _is_jump(latest: int, stamp: int, following: int) -> bool:
@@ -132,31 +148,59 @@ def _is_outlier(latest: int, stamp: int, following: int) -> bool:
 
 
 class LogReader:
-    """The bytes of a recorded log, in blocks."""
+    """The bytes of a recorded log, in blocks. A log may be larger than the memory, or come from a pipe."""
 
     def __init__(self, path: str) -> None:
-        """Read the file. Raises UsageError if it does not exist, cannot be read, or is empty."""
+        """Open it and read its head. Raises UsageError, one line: not there, not a file, empty, of another kind."""
         self.path = path
-        self._log = _read(path)
-        self.size = len(self._log)
+        try:
+            self._descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        except (OSError, ValueError) as problem:
+            raise self._unreadable(problem) from None
+        weakref.finalize(self, os.close, self._descriptor)
+        status = os.fstat(self._descriptor)
+        self._is_pipe = stat.S_ISFIFO(status.st_mode)
+        if stat.S_ISDIR(status.st_mode):
+            raise UsageError(f"cannot read the log {path!r}: Is a directory")
+        if not (self._is_pipe or stat.S_ISREG(status.st_mode)):
+            raise UsageError(
+                f"cannot read the log {path!r}: it is not a file but a device; write for example flight.tlog"
+            )
+        self._size = status.st_size
         self.given = 0
-        """Bytes of the log that `blocks` has returned."""
+        """Bytes that `blocks` has returned."""
+        self.head = self._read(PATIENCE)
+        """The first bytes of the log."""
+        if not self.head:
+            raise UsageError(f"the log {path!r} is empty")
+        for magic, what in OTHER_FILES.items():
+            if self.head.startswith(magic):
+                raise UsageError(f"{path} is {what}")
+
+    @property
+    def share(self) -> float:
+        """The fraction of the log that `blocks` has returned, from 0 to 1; 0 for a pipe, whose size is not known."""
+        return min(self.given / self._size, 1.0) if self._size else 0.0
 
     def blocks(self) -> Iterator[bytes]:
-        """The whole log, in order."""
-        for start in range(0, self.size, BLOCK):
-            self.given = min(start + BLOCK, self.size)
-            yield self._log[start : start + BLOCK]
+        """The whole log, in order. Iterate once."""
+        chunk = self.head
+        while chunk:
+            for start in range(0, len(chunk), BLOCK):
+                block = chunk[start : start + BLOCK]
+                self.given += len(block)
+                yield block
+            chunk = self._read(None)
 
+    def _read(self, seconds: float | None) -> bytes:
+        """The next bytes; none at the end. Waits for the writer of a pipe, at most `seconds`."""
+        try:
+            if self._is_pipe and not select.select([self._descriptor], [], [], seconds)[0]:
+                raise UsageError(f"cannot read the log {self.path!r}: it is a pipe, and nothing was written to it")
+            return os.read(self._descriptor, CHUNK)
+        except OSError as problem:
+            raise self._unreadable(problem) from None
 
-def _read(path: str) -> bytes:
-    """The whole file: faster than mmap, and safe if the file is truncated meanwhile."""
-    try:
-        with open(path, "rb") as file:
-            log = file.read()
-    except (OSError, ValueError) as problem:
+    def _unreadable(self, problem: Exception) -> UsageError:
         reason = (problem.strerror if isinstance(problem, OSError) else None) or "not a file name"
-        raise UsageError(f"cannot read the log {path!r}: {reason}") from None
-    if not log:
-        raise UsageError(f"the log {path!r} is empty")
-    return log
+        return UsageError(f"cannot read the log {self.path!r}: {reason}")

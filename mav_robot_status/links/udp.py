@@ -10,14 +10,17 @@ import random
 import socket
 import struct
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mav_robot_status.errors import LinkError
-from mav_robot_status.links.base import Address, Received
+from mav_robot_status.links.base import Address, Dated, Received
 from mav_robot_status.links.listen import LocalPort
 from mav_robot_status.links.resolve import CHECK_AGAIN, Lookup, Target
 from mav_robot_status.links.retry import Backoff, RandomFraction, StateLog
 from mav_robot_status.links.url import Url, host_port
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 log = logging.getLogger(__name__)
 
@@ -31,6 +34,9 @@ ANSWER_SILENCE = 30.0
 """Seconds of silence of the peer that answered, after which the link broadcasts again."""
 
 _MAX_DATAGRAM = 65535
+_SO_TIMESTAMPNS = 35
+_TIMESPEC = struct.Struct("@qq")
+_CONTROL = socket.CMSG_SPACE(_TIMESPEC.size)
 _SO_RCVBUFFORCE = 33  # Linux; Python has no names for these
 _SO_MEMINFO = 55
 _MEMINFO = struct.Struct("9I")  # the last word counts the datagrams that the kernel dropped
@@ -88,6 +94,17 @@ class UdpLink:
                 pieces.append(new(Received, receive(_MAX_DATAGRAM)))
         except OSError:  # nothing waits; or the error of an earlier send, which this read has cleared
             pass
+        return pieces
+
+    def receive_dated(self, limit: int = 64) -> list[Dated]:
+        """As `receive`, with the kernel's time stamps."""
+        pieces: list[Dated] = []
+        if self._socket is None:
+            return pieces
+        with suppress(OSError):
+            while len(pieces) < limit:
+                data, control, _, source = self._socket.recvmsg(_MAX_DATAGRAM, _CONTROL)
+                pieces.append(Dated(data, source, _stamp(control)))
         return pieces
 
     def send(self, data: bytes, to: Address = None) -> bool:
@@ -208,6 +225,16 @@ class UdpBroadcaster(UdpSender):
     def receive(self, limit: int = 64) -> list[Received]:
         """The datagrams that wait; the first sender becomes the peer."""
         pieces = super().receive(limit)
+        self._hear(pieces)
+        return pieces
+
+    def receive_dated(self, limit: int = 64) -> list[Dated]:
+        """The same with stamps."""
+        pieces = super().receive_dated(limit)
+        self._hear(pieces)
+        return pieces
+
+    def _hear(self, pieces: Sequence[Received | Dated]) -> None:
         if pieces and self._peer == self._broadcast_address:
             peer: Any = pieces[0].source
             self._peer = peer
@@ -215,7 +242,6 @@ class UdpBroadcaster(UdpSender):
         if any(piece.source == self._peer for piece in pieces):
             self._answered = True
             self._due = -math.inf
-        return pieces
 
     def _open(self, target: Target) -> None:
         super()._open(target)
@@ -235,10 +261,21 @@ class UdpBroadcaster(UdpSender):
             self._peer = self._broadcast_address
 
 
+def _stamp(control: list[tuple[int, int, bytes]]) -> int | None:
+    """The kernel's time stamp of a datagram, in microseconds since 1970."""
+    for level, kind, value in control:
+        if level == socket.SOL_SOCKET and kind == _SO_TIMESTAMPNS and len(value) == _TIMESPEC.size:
+            seconds, nanoseconds = _TIMESPEC.unpack(value)
+            return int(seconds) * 1_000_000 + int(nanoseconds) // 1000
+    return None
+
+
 def _new_socket(family: int) -> socket.socket:
-    """A non-blocking socket. Its receive buffer is as large as the system allows."""
+    """A non-blocking socket with time stamps. Its receive buffer is as large as the system allows."""
     new = socket.socket(family, socket.SOCK_DGRAM)
     new.setblocking(False)
+    with suppress(OSError):  # without stamps input counts as old after a pause
+        new.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
     try:
         new.setsockopt(
             socket.SOL_SOCKET, _SO_RCVBUFFORCE, RECEIVE_BUFFER

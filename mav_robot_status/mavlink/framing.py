@@ -4,6 +4,10 @@
 `definitions.CRC_EXTRA`. Only wanted frames become values. The parser has two states. *In sync* it trusts a header far
 enough to skip a frame that it cannot check. *Out of sync* it accepts only a whole frame with a valid CRC. So a wrong
 length byte cannot hide the valid frames behind it, and no damaged frame is counted twice.
+
+The work for each byte is bounded for any input. A place at which a frame may start costs far more than a byte, and
+bytes such as 0xFE can be one at every place. So each check is paid for with bytes that were read, see `CHECK`. What a
+search has found is kept until more bytes arrive, so a stream in small pieces is not searched again with each piece.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from .definitions import CRC_EXTRA
 from .wire import FORMATS, MAGIC, REVERSED, SIGNED, UNDO, UNKNOWN, V1, V2, known_ids
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
 
 MAX_SOURCES: Final = 1024
 """The most (system, component) pairs that are checked for lost frames. A further one is checked only until another
@@ -25,8 +29,17 @@ sends."""
 STAMP = struct.Struct(">Q").unpack_from  # precedes each frame of a recorded log: microseconds since 1970
 STAMP_SIZE: Final = 8
 LATE = 240  # a gap this long means a frame up to 16 places late, or a duplicate; not 240 lost frames
+CHECK: Final = 24
+"""Bytes that must have been read for each check of a place at which a frame may start. Random bytes have one such place
+in 350 bytes. Where there are many more, a search looks at some of them only."""
+SKIP: Final = 12
+"""Bytes that must have been read for each skipped frame without a valid CRC. The shortest frame of MAVLink 2 has as
+many, so frames of an unknown dialect are always skipped whole."""
+MOST_CREDIT, FIRST_CREDIT = 6144, 768
+"""Unspent bytes that are kept for later checks, and those that a new parser has. A damaged frame may consist of places
+at which a frame may start; all of them are checked. A new parser has fewer, because each new address gets a parser."""
 NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; a lookup is faster than the arithmetic
-VALID, OPEN, WRONG = range(3)
+VALID, WRONG = 0, -1
 new = tuple.__new__  # makes a NamedTuple of a tuple in a third of the time of its constructor
 
 
@@ -67,6 +80,7 @@ class Parser:
     """
 
     __slots__ = (
+        "_credit",
         "_current",
         "_expected",
         "_format",
@@ -74,6 +88,8 @@ class Parser:
         "_keep_all",
         "_known",
         "_next_expected",
+        "_open",
+        "_searched",
         "_stamp_size",
         "_tail",
         "counters",
@@ -87,6 +103,9 @@ class Parser:
         """The stamp of the last valid frame, wanted or not, if frames are stamped."""
         self._tail = b""
         self._in_sync = True
+        self._credit = FIRST_CREDIT  # unspent bytes at the start of `_tail`
+        self._open: list[tuple[int, int]] = []  # out of sync: the places in `_tail` that are not decided, see `_search`
+        self._searched = 0  # out of sync: the bytes of `_tail` that were searched
         self._format = FORMATS[V2]  # of the last frame: most streams have only one version, and often one source
         self._current = 0  # the last source: system | component << 8; 0.0 means none
         self._next_expected: int | None = None  # the next sequence number of the last source
@@ -104,6 +123,7 @@ class Parser:
         self.counters.garbage_bytes += len(self._tail)
         self._tail = b""
         self._in_sync = True
+        self._open, self._searched = [], 0
 
     def feed(self, data: bytes) -> list[Frame]:
         """The wanted frames that these bytes complete, in order. Never raises; keeps at most MAX_FRAME bytes."""
@@ -131,9 +151,11 @@ class Parser:
         trailer, limit = 2 + stamped, size + stamped  # the CRC and the next stamp; where they may end
         before = -1
         if not self._in_sync:
-            i = self._resync(data, reversed_data, min(stamped, size))
+            i = self._resync(data, reversed_data, max(self._searched, min(stamped, size)), self._open)
             if not self._in_sync:
-                self._tail = data[max(0, i - stamped) :]
+                rest = max(0, i - stamped)
+                self._tail = data[rest:]
+                self._credit += rest
                 return frames
         try:
             while i < size:
@@ -163,7 +185,7 @@ class Parser:
                     if current in expected:
                         expected[current] = next_expected
                     unverified = i
-                    i = self._skip_unverified(data, reversed_data, i, following)
+                    i = self._skip_unverified(data, reversed_data, i, following, sequence, source, wire_id)
                     next_expected = expected.get(current)
                     if self._in_sync and i > unverified:
                         if self._keep_all and effect < 0 and i == following:
@@ -202,7 +224,9 @@ class Parser:
         except struct.error:
             pass  # the data ends within a header
         self._current, self._next_expected = current, next_expected
-        self._tail = data[i - stamped :]
+        rest = i - stamped
+        self._tail = data[rest:]
+        self._credit += rest
         if stamped and before >= 0:
             (self.last_stamp,) = STAMP(data, before - stamped)
         self.counters.frames += good
@@ -221,7 +245,9 @@ class Parser:
             self.counters.lost += gap
         return NEXT[sequence]
 
-    def _skip_unverified(self, data: bytes, reversed_data: bytes, i: int, following: int) -> int:
+    def _skip_unverified(
+        self, data: bytes, reversed_data: bytes, i: int, following: int, sequence: int, source: int, wire_id: Any
+    ) -> int:
         """The position after a whole frame whose CRC is wrong or cannot be checked; `i`: wait for more data.
 
         `following` is the start of the next frame if the length in the header is right. The length in a damaged frame
@@ -229,19 +255,29 @@ class Parser:
         start behind it. If the data ends with the frame, and a part of it may still become a frame, the parser waits
         for more data. Otherwise the parser is out of sync.
         """
-        _, _, sequence, source, wire_id = FORMATS[data[i]].unpack(data, i)
+        credit = self._credit
+        if credit + following > MOST_CREDIT:
+            credit = MOST_CREDIT - following
+        if credit + following < SKIP:
+            return self._resync(data, reversed_data, i)
+        self._credit = credit - SKIP
         message_id = wire_id if isinstance(wire_id, int) else int.from_bytes(wire_id, "little")
         bad = message_id in CRC_EXTRA
         at_end = following >= len(data)
-        inside, open_inside = self._find(data, reversed_data, i + 1, following) if bad or at_end else (-1, -1)
+        inside, open_ = self._search(data, reversed_data, i + 1, following) if bad or at_end else (-1, [])
         if bad and inside >= 0:
             count(self.counters.bad_crc, message_id)
             self.counters.garbage_bytes += inside - i
             return inside
-        if at_end and (inside >= 0 or open_inside >= 0):
+        if at_end and (inside >= 0 or open_):
+            self._credit += SKIP
             return i
-        if at_end or data[following] in (V1, V2):
-            count(self.counters.bad_crc if bad else self.counters.unknown, message_id)
+        if at_end or data[following] in FORMATS:
+            table = self.counters.bad_crc if bad else self.counters.unknown
+            if message_id in table:
+                table[message_id] += 1  # `count` without its call
+            else:
+                count(table, message_id)
             # its header may be damaged: the sequence number counts only if it is the expected one
             if self._expected.get(source) == sequence:
                 self._expected[source] = NEXT[sequence]
@@ -250,41 +286,71 @@ class Parser:
             count(self.counters.bad_crc, message_id)
         return self._resync(data, reversed_data, i)
 
-    def _resync(self, data: bytes, reversed_data: bytes, i: int) -> int:
-        """The start of the next valid frame, in sync again; else the first position at which a frame may start."""
-        found, open_ = self._find(data, reversed_data, i, len(data))
+    def _resync(self, data: bytes, reversed_data: bytes, i: int, known: Sequence[tuple[int, int]] = ()) -> int:
+        """The start of the next valid frame, in sync again; else the first position at which a frame may start.
+
+        `known` are the places before `i` that were not decided when the data was shorter.
+        """
+        size = len(data)
+        start = known[0][0] if known else i
+        found, open_ = self._search(data, reversed_data, i, size, known)
         self._in_sync = found >= 0
-        stop = found if found >= 0 else open_ if open_ >= 0 else len(data)
-        self.counters.garbage_bytes += stop - i
+        stop = found if found >= 0 else open_[0][0] if open_ else size
+        tail = max(0, stop - self._stamp_size)
+        self._open, self._searched = [(at - tail, needed - tail) for at, needed in open_], size - tail
+        self.counters.garbage_bytes += stop - start
         return stop
 
-    def _find(self, data: bytes, reversed_data: bytes, start: int, stop: int) -> tuple[int, int]:
-        """The first start of a valid frame in a range, and before it the first start of an incomplete one; -1: none."""
-        open_ = -1
-        while match := MAGIC.search(data, start, stop):
+    def _search(
+        self, data: bytes, reversed_data: bytes, start: int, stop: int, known: Sequence[tuple[int, int]] = ()
+    ) -> tuple[int, list[tuple[int, int]]]:
+        """The first start of a valid frame in a range, or -1; and the places before it that are not decided yet.
+
+        Those are pairs: the start of a frame, and how long the data must be to decide. `known` are such places before
+        the range; they are paid for. If a check cannot be paid for, the search goes on where it can.
+        """
+        size = len(data)
+        open_: list[tuple[int, int]] = []
+        for place in known:
+            at, needed = place
+            if needed <= size:
+                needed = self._check(data, reversed_data, at)
+                if needed == VALID:
+                    return at, open_
+                if needed == WRONG:
+                    continue
+                place = at, needed
+            open_.append(place)
+        credit = self._credit
+        found = -1
+        while match := MAGIC.search(data, max(start, CHECK - credit), stop):
             at = match.start()
-            verdict = self._check(data, reversed_data, at)
-            if verdict == VALID:
-                return at, open_
-            if verdict == OPEN and open_ < 0:
-                open_ = at
+            credit = min(credit, MOST_CREDIT - at) - CHECK
+            needed = self._check(data, reversed_data, at)
+            if needed == VALID:
+                found = at
+                break
+            if needed != WRONG:
+                open_.append((at, needed))
             start = at + 1
-        return -1, open_
+        self._credit = credit
+        return found, open_
 
     def _check(self, data: bytes, reversed_data: bytes, i: int) -> int:
-        """VALID: a whole frame of a known id with a valid CRC. OPEN: the data ends too early to decide."""
+        """VALID: a whole frame of a known id with a valid CRC. WRONG: not. Else the length of the data to decide."""
         size = len(data)
         version, unpack, header, seed = FORMATS[data[i]]
         if i + header > size:
-            return OPEN
+            return i + header
         length, flags, _, _, wire_id = unpack(data, i)
         known = self._known[version]
         effect, _ = known[wire_id] if version == V1 or wire_id in known else UNKNOWN
         if effect < 0:
             return WRONG
         end = i + header + length
-        if end + (15 if flags and flags & SIGNED else 2) > size:
-            return OPEN
+        needed: int = end + (15 if flags and flags & SIGNED else 2)
+        if needed > size:
+            return needed
         crc = crc_hqx(reversed_data[i:end], seed) ^ effect
         return VALID if crc == UNDO[reversed_data[end + 1]] ^ reversed_data[end] else WRONG
 

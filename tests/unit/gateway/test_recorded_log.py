@@ -138,7 +138,11 @@ def test_any_bytes_are_read_to_the_end_in_time_order(recording: Write, parts: li
     [
         (None, "cannot read the log '{}': No such file or directory"),
         (b"", "the log '{}' is empty"),
-        (b"\xa3\x95" * 1000, "{} is not a recorded log: no MAVLink frame with a time stamp in it; a .tlog is needed"),
+        (b"\xa3\x96" * 1000, "{} is not a recorded log: no MAVLink frame with a time stamp in it; a .tlog is needed"),
+        (b"\xa3\x95" * 1000, "{} is a DataFlash log (.bin) of ArduPilot, which holds no MAVLink"),
+        (b"ULog\x01\x12\x35\x01", "{} is a flight log (.ulg) of PX4, which holds no MAVLink"),
+        (b"\x1f\x8b\x08", "{} is compressed with gzip; unpack it first"),
+        (frame(0) + frame(1), "{} is a raw capture: MAVLink without the time stamps of a .tlog; replay it with --raw"),
     ],
 )
 def test_a_file_that_is_not_a_log_is_a_one_line_error(tmp_path: Path, content: bytes | None, part: str) -> None:

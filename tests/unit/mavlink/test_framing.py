@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
+from fuzz.work import RANDOM, SHAPES, SIZE, checks, cut
 from mav_robot_status.mavlink.counters import MAX_IDS, OTHER_IDS, Counters
 from mav_robot_status.mavlink.definitions import CRC_EXTRA, MESSAGES, Attitude, Heartbeat, Statustext
 from mav_robot_status.mavlink.encode import Encoder, encode
@@ -415,3 +416,36 @@ def test_after_any_noise_frames_are_parsed_again(pieces: list[bytes]) -> None:
     # the noise may end in a header that claims one frame's length at most, or in one whole skipped frame
     frames = [f for i in range(30) for f in parser.feed(heartbeat(i))]
     assert [f.sequence for f in frames][-1] == 29
+
+
+@pytest.mark.parametrize("piece", [SIZE, 280, 97, 1])
+@pytest.mark.parametrize("name", SHAPES)
+def test_bytes_that_look_like_starts_of_frames_cost_few_checks(name: str, piece: int) -> None:
+    data = SHAPES[name][: 200 * piece]
+    number, total = checks(cut(data, piece))
+    assert number <= len(data) / 4 + 100
+    assert total <= 32 * len(data) + 280 * 100
+
+
+def test_a_stream_in_small_pieces_is_not_searched_again_with_each_piece() -> None:
+    data = RANDOM[:20_000]
+    whole, _ = checks([data])
+    for piece in (1, 7, 50):
+        number, _ = checks(cut(data, piece))
+        assert number <= 3 * whole + 10
+
+
+def test_a_valid_frame_behind_any_flood_is_found() -> None:
+    for name, data in SHAPES.items():
+        for size in (300, 5000, SIZE):
+            # the flood may end in a header that claims one frame's length at most
+            frames, _ = feed(data[:size], *(heartbeat(i) for i in range(30)))
+            assert [frame.sequence for frame in frames][-10:] == list(range(20, 30)), name
+
+
+def test_a_damaged_frame_full_of_magic_bytes_hides_no_frame() -> None:
+    for magic in (b"\xfe", b"\xfd", b"\xfe\xfd", b"\xfd\0"):
+        broken = bytearray(encode(Statustext(6, (magic * 50)[:50], 1, 1), system=1, component=1, sequence=0))
+        broken[-1] ^= 0x55
+        frames, _ = feed(*STREAM, bytes(broken) + heartbeat(1), bytes(broken[3:]) + heartbeat(2), heartbeat(3))
+        assert [frame.sequence for frame in frames[-3:]] == [1, 2, 3]

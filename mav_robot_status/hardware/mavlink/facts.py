@@ -104,6 +104,8 @@ class Latched(NamedTuple):
     causes: tuple[Cause, ...]
     termination_outlived: bool
     """Whether the vehicle is still armed some time after it announced a termination."""
+    failsafe_over: bool
+    """Whether a text ended the last known failsafe, and the state in the HEARTBEAT may be older than that."""
 
 
 class SensorFault(NamedTuple):

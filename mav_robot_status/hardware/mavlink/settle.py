@@ -25,7 +25,6 @@ from .facts import (
     Stop,
     SystemStatus,
 )
-from .identity import sensor_name
 from .state import estop, latches, outputs, sensors, text_assembly
 from .state.boot_clock import GRACE
 from .state.latest_messages import FRESH
@@ -50,7 +49,7 @@ TOGETHER: Final = 5.0
 NO_OUTPUTS: Final = Outputs(False, False, False, False)
 NOTHING_SAID: Final = Stop(UNKNOWN, None, False)
 NO_SYS_STATUS: Final = SystemStatus(False, UNKNOWN, None, False)
-NOTHING_LATCHED: Final = Latched((), False)
+NOTHING_LATCHED: Final = Latched((), False, False)
 NO_HINTS: Final = ModeHints()
 
 
@@ -193,26 +192,25 @@ def faults(state: VehicleState, moment: Moment, options: HardwareOptions) -> tup
         return ()
     return tuple(
         SensorFault(bit, weight is SOFT, fault.since.unix_us)
-        for bit, weight, fault in sensors.counting(state.faults, state.profile, state.heartbeats.armed)
-        if sensor_name(bit) not in options.ignore_sensors
-        and (
-            fault.messages >= sensors.DEBOUNCE_MESSAGES or moment.has_come(fault.since.mono + sensors.DEBOUNCE_SECONDS)
-        )
+        for bit, weight, fault in state.counting_faults(options)
+        if fault.messages >= sensors.DEBOUNCE_MESSAGES or moment.has_come(fault.since.mono + sensors.DEBOUNCE_SECONDS)
     )
 
 
 def latched(state: VehicleState, moment: Moment, options: HardwareOptions) -> Latched:
     """The causes that were announced and are still active."""
-    if not state.latches:
+    if not state.latches and state.failsafe_cleared is None:
         return NOTHING_LATCHED
+    errors = state.error_bits(options) if moment.is_fresh(state.latest.sys_status, options.sys_status_timeout) else ()
     lasting = tuple(
         Cause(code, latch.text, latch.since.unix_us)
         for code, latch in state.latches.items()
-        if not moment.has_come(latches.ends_at(code, latch, state.heartbeats, options.text_hold_s))
+        if not moment.has_come(latches.ends_at(code, latch, state.heartbeats, errors, options.text_hold_s))
     )
     seen = state.latest.heartbeat
     outlived = seen is not None and latches.has_outlived_termination(state.latches, state.heartbeats.armed, seen.at)
-    return Latched(lasting, outlived)
+    cleared = state.failsafe_cleared
+    return Latched(lasting, outlived, cleared is not None and seen is not None and seen.at <= cleared + latches.CLEARED)
 
 
 def explained(state: VehicleState, moment: Moment, options: HardwareOptions) -> Explained:

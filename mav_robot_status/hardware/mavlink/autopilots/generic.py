@@ -32,9 +32,17 @@ GENERIC: Final = Autopilot(
     recognition=Recognition(autopilots=frozenset(), lacks=None),
     modes=Modes(flight_mode=standard, overrides_key=None, initialising={}),
     states=States(uninit=Uninit.STARTING, standby_is_landed=False),
-    texts=Texts(rules=(), stop_text=StopText.STATE, safety_switch=frozenset(), sends_events=False, firmware={}),
+    texts=Texts(
+        rules=(),
+        stop_text=StopText.STATE,
+        safety_switch=frozenset(),
+        sends_events=False,
+        failsafe_is_any=frozenset(),
+        firmware={},
+    ),
     sensors=Sensors(
         weights=sensor_weights.COMMON,
+        since={},
         are_monitored=True,
         faulty_needs_present=True,
         readiness_in_health_alone=False,

@@ -102,6 +102,9 @@ class Texts:
     """The texts that give the safety switch as the reason not to arm."""
     sends_events: bool
     """Whether the levels of an EVENT have the meaning of STATUSTEXT severities."""
+    failsafe_is_any: frozenset[Family]
+    """The families whose texts about a failsafe name radio or ground station whichever of both is lost, and whose text
+    that clears one clears both."""
     firmware: Mapping[str, Family]
     """The names of the firmware in the text of its boot, which gives its version, each with its kind of vehicle."""
 
@@ -112,6 +115,8 @@ class Sensors:
 
     weights: Weights
     """The meaning of a faulty bit; other bits are ignored."""
+    since: Mapping[int, Version]
+    """Bits whose health has this meaning only from a version on; older firmware means something else."""
     are_monitored: bool
     """Whether its bits ever change. If not, a SYS_STATUS without faults proves nothing."""
     faulty_needs_present: bool

@@ -147,10 +147,12 @@ PX4: Final = Autopilot(
         stop_text=StopText.STATE,
         safety_switch=frozenset({"Preflight Fail: Press safety button first"}),
         sends_events=True,
+        failsafe_is_any=frozenset(),
         firmware={},
     ),
     sensors=Sensors(
         weights=WEIGHTS,
+        since={},
         are_monitored=True,
         faulty_needs_present=False,  # a missing required component is enabled, and not present
         readiness_in_health_alone=True,

@@ -137,6 +137,10 @@ class Facts(NamedTuple):
     movement: Movement
     receiver_stands: bool
     """Whether the GPS receiver reports that it stands still."""
+    turns: bool
+    """Whether it turns, according to the rotation alone."""
+    has_no_lift: bool
+    """Whether an aircraft that reports to be in the air has no throttle that carries it."""
     outputs: Outputs
     outputs_vetoed: bool
     """Whether a motion shows that the vehicle is driven although the outputs seem held."""

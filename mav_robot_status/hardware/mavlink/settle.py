@@ -25,8 +25,10 @@ from .facts import (
     Stop,
     SystemStatus,
 )
+from .identity import AIRCRAFT, IN_THE_AIR
 from .state import estop, latches, outputs, sensors, text_assembly
 from .state.boot_clock import GRACE
+from .state.estimator import denied_until
 from .state.latest_messages import FRESH
 from .state.motion import SUSTAIN_OFF, SUSTAIN_ON
 from .state.speeds import driving_speed, speed_over_ground
@@ -45,6 +47,9 @@ CURRENT_MODE_FRESH: Final = 5.0
 """Seconds for which a CURRENT_MODE is valid."""
 TOGETHER: Final = 5.0
 """Seconds between a loss of RC and a failsafe that it explains."""
+
+LEAST_LIFT: Final = 10
+"""VFR_HUD.throttle in percent below which no aircraft hovers."""
 
 NO_OUTPUTS: Final = Outputs(False, False, False, False)
 NOTHING_SAID: Final = Stop(UNKNOWN, None, False)
@@ -124,6 +129,27 @@ def movement(state: VehicleState, moment: Moment, options: HardwareOptions) -> M
 def receiver_stands(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
     """Whether the GPS receiver reports that it stands still."""
     return settled(state.gps_motion, moment) is FALSE
+
+
+def turns(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
+    """Whether it turns. The estimator's own word against it makes that unknown."""
+    return (
+        settled(state.rotation, moment) is TRUE
+        and moment.is_fresh(state.latest.attitude, FRESH)
+        and moment.has_come(denied_until(state))
+    )
+
+
+def has_no_lift(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
+    """Whether an aircraft in the air has no throttle that carries it: a hover needs more."""
+    heard, hud, watch = state.latest.extended_sys_state, state.latest.vfr_hud, state.watch
+    if heard is None or heard.message.landed_state not in IN_THE_AIR or state.vehicle_type not in AIRCRAFT:
+        return False
+    if hud is not None and hud.message.throttle < LEAST_LIFT and moment.is_fresh(hud, FRESH):
+        return True
+    named = not outputs.channels(watch, state.vehicle_type)[1]
+    at_stop = named and watch.at is not None and outputs.is_at_stop(watch, state.vehicle_type)
+    return at_stop and watch.at is not None and moment.is_within(watch.at + FRESH)
 
 
 def motor_outputs(state: VehicleState, moment: Moment, options: HardwareOptions) -> Outputs:
@@ -246,6 +272,8 @@ SETTLE: Final[dict[str, Settle]] = {
     "landed_state": landed_state,
     "movement": movement,
     "receiver_stands": receiver_stands,
+    "turns": turns,
+    "has_no_lift": has_no_lift,
     "outputs": motor_outputs,
     "outputs_vetoed": outputs_vetoed,
     "esc_turning": esc_turning,

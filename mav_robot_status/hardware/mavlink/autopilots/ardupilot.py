@@ -9,6 +9,7 @@ Texts: strings checked in 4.7-dev and 4.5.6, with older wordings that occur in r
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 from ....interface.status import RobotMode
@@ -303,6 +304,9 @@ ARDUPILOT: Final = Autopilot(
         zero=ZeroSpeed.ESTIMATOR_HEALTHY,
         hud=HudSpeed.MOTION_AND_REST,
         needs_healthy_estimator=True,
+        denied_by=re.compile(
+            r"(PreArm|Arm): (EKF attitude is bad|AHRS:? not healthy|EKF (position|velocity|height) variance)"
+        ),
         reports_estimator=True,
     ),
     requests=Requests(

@@ -60,8 +60,9 @@ GENERIC: Final = Autopilot(
     ),
     speeds=Speeds(
         zero=ZeroSpeed.ALWAYS,
-        hud=HudSpeed.REST_WITH_GPS,  # INAV and Betaflight send zero without GPS
+        hud=HudSpeed.REST_WITH_GPS,  # INAV, Betaflight and others send zero for a speed that they do not know
         needs_healthy_estimator=False,
+        denied_by=None,
         reports_estimator=False,
     ),
     requests=Requests(

@@ -9,6 +9,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import re
     from collections.abc import Callable, Mapping
 
     from ....mavlink.definitions import Heartbeat
@@ -58,7 +59,7 @@ class HudSpeed(Enum):
 
     MOTION_AND_REST = "its speed, as that of a position message"
     MOTION_ONLY = "motion, never rest"
-    REST_WITH_GPS = "its speed; zero counts only with GPS, unless the vehicle is an aircraft"
+    REST_WITH_GPS = "its speed; zero counts only while SYS_STATUS shows a healthy GPS receiver"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,6 +157,8 @@ class Speeds:
     hud: HudSpeed
     needs_healthy_estimator: bool
     """Whether a disarmed vehicle with a faulty AHRS has no estimate."""
+    denied_by: re.Pattern[str] | None
+    """The texts in which a disarmed autopilot says that its own estimate is wrong, repeated while it is."""
     reports_estimator: bool
     """Whether EKF_STATUS_REPORT shows if the position is measured."""
 

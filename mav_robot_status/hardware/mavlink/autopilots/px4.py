@@ -172,6 +172,7 @@ PX4: Final = Autopilot(
         zero=ZeroSpeed.ALWAYS,
         hud=HudSpeed.MOTION_ONLY,  # no position messages are sent while the estimate is not valid
         needs_healthy_estimator=False,
+        denied_by=None,
         reports_estimator=False,
     ),
     requests=Requests(

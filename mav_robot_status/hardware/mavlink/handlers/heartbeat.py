@@ -64,7 +64,7 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         state.failsafe_cleared = None
         state.not_ready = state.failsafe = None
     if not connected:
-        state.motion, state.gps_motion = Motion(), Motion()
+        state.motion, state.gps_motion, state.rotation = Motion(), Motion(), Motion()
     if not connected or (before.armed and not heartbeats.armed):
         state.stop = state.stop._replace(ready=0)
         state.assumed_free = False

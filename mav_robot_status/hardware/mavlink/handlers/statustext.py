@@ -86,6 +86,9 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
             state.not_ready = _say(state.not_ready, words, now)
     elif effect is Effect.READINESS:
         state.not_ready = _say(state.not_ready, words, now)
+        denied_by = state.profile.speeds.denied_by
+        if denied_by is not None and denied_by.match(words):
+            state.denied_at = now.mono
     elif effect is Effect.DETAIL:
         state.failsafe = _say(state.failsafe, words, now)
 

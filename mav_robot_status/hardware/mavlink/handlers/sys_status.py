@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from ....interface.status import TriState
@@ -33,7 +34,7 @@ def sys_status(state: VehicleState, message: SysStatus, now: Instant, options: H
     state.stop = estop.heard_sys_status(state.stop, message, state.heartbeats, profile, now.mono)
     state.faults = sensors.heard_faults(state.faults, sensors.faulty_mask(message, profile), now)
     if state.not_ready is not None and sensors.readiness(message, profile) is TriState.TRUE:
-        state.not_ready = None
+        state.not_ready, state.denied_at = None, -math.inf
         seen.unsettled = True
     if profile.sensors.counts_internal_errors and (message.errors_count1 or message.errors_count2):
         state.internal_errors_since = state.internal_errors_since or now

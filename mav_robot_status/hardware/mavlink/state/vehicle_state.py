@@ -68,8 +68,14 @@ class VehicleState:
     """Whether ArduPilot's estimator reports that its position is not measured."""
     unaided_at: float = -math.inf
     """The time of the latest such report."""
+    tilted: bool = False
+    """Whether that report lacks an attitude: nothing that the estimator says is right then."""
+    denied_at: float = -math.inf
+    """When the autopilot last said in a text that its estimate is wrong; monotonic seconds."""
     turning: float = 0.0
     """The rotation in the latest ATTITUDE, rad/s."""
+    rotation: Motion = field(default_factory=Motion)
+    """The motion according to rotation alone. Its FALSE means nothing."""
     watch: outputs.Watch = field(default_factory=outputs.Watch)
     switches: Mapping[int, int] = field(default_factory=dict)
     """RCn_OPTION by channel, as far as received."""

@@ -273,7 +273,7 @@ ARDUPILOT: Final = Autopilot(
         stop_text=StopText.READINESS,
         safety_switch=frozenset(),
         sends_events=False,
-        failsafe_is_any=frozenset({Family.ROVER}),
+        failsafe_is_any={Family.ROVER: re.compile(r"(Radio|GCS) Failsafe")},
         firmware=FIRMWARE,
     ),
     sensors=Sensors(

@@ -37,7 +37,7 @@ GENERIC: Final = Autopilot(
         stop_text=StopText.STATE,
         safety_switch=frozenset(),
         sends_events=False,
-        failsafe_is_any=frozenset(),
+        failsafe_is_any={},
         firmware={},
     ),
     sensors=Sensors(

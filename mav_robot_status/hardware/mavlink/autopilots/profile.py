@@ -59,7 +59,7 @@ class HudSpeed(Enum):
 
     MOTION_AND_REST = "its speed, as that of a position message"
     MOTION_ONLY = "motion, never rest"
-    REST_WITH_GPS = "its speed; zero counts only while SYS_STATUS shows a healthy GPS receiver"
+    REST_WITH_GPS = "its speed; zero counts only with a healthy GPS receiver in SYS_STATUS, unless it is an aircraft"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,9 +103,9 @@ class Texts:
     """The texts that give the safety switch as the reason not to arm."""
     sends_events: bool
     """Whether the levels of an EVENT have the meaning of STATUSTEXT severities."""
-    failsafe_is_any: frozenset[Family]
-    """The families whose texts about a failsafe name radio or ground station whichever of both is lost, and whose text
-    that clears one clears both."""
+    failsafe_is_any: Mapping[Family, re.Pattern[str]]
+    """By family, the texts about a failsafe that name radio or ground station whichever of both is lost; the text that
+    clears one clears both."""
     firmware: Mapping[str, Family]
     """The names of the firmware in the text of its boot, which gives its version, each with its kind of vehicle."""
 

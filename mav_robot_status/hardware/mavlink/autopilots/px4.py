@@ -147,7 +147,7 @@ PX4: Final = Autopilot(
         stop_text=StopText.STATE,
         safety_switch=frozenset({"Preflight Fail: Press safety button first"}),
         sends_events=True,
-        failsafe_is_any=frozenset(),
+        failsafe_is_any={},
         firmware={},
     ),
     sensors=Sensors(

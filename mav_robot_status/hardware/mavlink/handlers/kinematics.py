@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ....mavlink import definitions as mav
 from ....mavlink.enumerations import EKF_ATTITUDE, EKF_CONST_POS_MODE, GPS_FIX_TYPE_3D_FIX, MAV_TYPE_SURFACE_BOAT
 from ..autopilots.profile import HudSpeed, ZeroSpeed
-from ..identity import ROVER
+from ..identity import AIRCRAFT, ROVER
 from ..state import motion, sensors
 from ..state.boot_clock import heard_clock
 from ..state.estimator import FRESH as ESTIMATOR_FRESH
@@ -77,7 +77,7 @@ def vfr_hud(state: VehicleState, message: mav.VfrHud, now: Instant, options: Har
         pass
     elif hud is MOTION_ONLY:
         speed = _if_fast(state, speed, options)
-    elif hud is REST_WITH_GPS and still and not _has_gps(seen.sys_status):
+    elif hud is REST_WITH_GPS and still and state.vehicle_type not in AIRCRAFT and not _has_gps(seen.sys_status):
         speed = None
     _moved(state, state.motion, speed, at, options)
 

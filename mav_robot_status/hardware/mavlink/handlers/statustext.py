@@ -69,10 +69,9 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
     if effect is Effect.CAUSE and not _counts(rule.when, state):
         effect = Effect.DETAIL if state.heartbeats.armed else Effect.READINESS
     if effect is Effect.CAUSE:
-        for code in failsafe.lost(state, rule.codes, now.mono):
-            state.latches = latches.announce(state.latches, code, words, now)
+        failsafe.announced(state, words, rule.codes, now)
     elif effect is Effect.CLEAR:
-        failsafe.cleared(state, rule.codes, now.mono)
+        failsafe.cleared(state, words, rule.codes, now.mono)
     elif effect in (Effect.ESTOP, Effect.RELEASE):
         honoured_by = state.profile.stops.honoured_by
         if honoured_by is not None and state.heartbeats.armed and state.family not in honoured_by:

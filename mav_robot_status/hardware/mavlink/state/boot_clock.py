@@ -16,7 +16,7 @@ WRAP: Final = 1 << 32  # of a clock of 32 bits, after 49 days
 HALF: Final = WRAP // 2
 LATEST: Final = 15.0
 """Seconds by which packets are repeated at most. A clock that is farther behind is that of another autopilot."""
-DRIFT: Final = 0.1
+DRIFT: Final = 0.05
 """The error of a clock, as a part of its time, at most STEP_BACK: a simulation may run slower than its clock."""
 GRACE: Final = 10.0
 """Seconds after boot during which sensor bits raise no error."""

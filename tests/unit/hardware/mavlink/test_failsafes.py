@@ -43,6 +43,22 @@ def test_an_old_report_of_a_healthy_radio_does_not_tell_which_failsafe_it_is() -
     assert flight.text("Radio Failsafe").code == 2000
 
 
+def test_the_next_report_of_the_radio_tells_which_failsafe_it_is() -> None:
+    flight = driving(True).text("Radio Failsafe").hb(state=CRITICAL)
+    assert flight.code == 2002
+    flight.set(health=flight.health & ~RC).wait(1.1)
+    assert flight.code == 2001
+    flight = driving(True).stop("sys_status")
+    flight.wait(2)
+    flight.text("Radio Failsafe").hb(state=CRITICAL).resume().wait(1)
+    assert flight.codes == [2002]
+
+
+def test_the_mask_of_an_old_rover_names_its_failsafe() -> None:
+    assert driving(None).text("Failsafe trigger 0x2").code == 2002
+    assert driving(True).text("Failsafe trigger 0x1").code == 2001
+
+
 @pytest.mark.parametrize("text", ["Radio Failsafe Cleared", "GCS Failsafe Cleared"])
 @pytest.mark.parametrize("radio", [True, False, None])
 def test_on_a_rover_either_text_ends_both(text: str, radio: bool | None) -> None:

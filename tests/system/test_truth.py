@@ -130,9 +130,9 @@ def test_the_event_of_a_failsafe_ends_with_it(tmp_path: Path) -> None:
             out.append(Outgoing(Event(1 << 24, 15_000, 1, 0, 0, 0x22, b""), 250))
         log += b"".join(now.unix_us.to_bytes(8, "big") + outgoing.frame() for outgoing in out)
     lines = replayed(tmp_path / "event.tlog", log)
-    at = {round(float(line["stamp"][17:-1]), 1): line["error_code"] for line in lines}
-    assert at[16.5] == 7002
-    assert {code for seconds, code in at.items() if 19.2 < seconds < 29} == {0}
+    at = {round(float(line["stamp"][17:-1]), 1): [error["code"] for error in line["errors"]] for line in lines}
+    assert at[16.5] == [2000, 7002]
+    assert [found for seconds, found in at.items() if 19.2 < seconds < 24 and found] == []
 
 
 def test_packets_that_a_tunnel_repeats_are_not_a_reboot(

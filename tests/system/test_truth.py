@@ -85,7 +85,7 @@ def test_a_rover_that_has_lost_its_radio_says_so(play: Callable[..., list[dict[s
 def test_a_rover_that_does_not_show_its_radio_has_a_failsafe_of_either_kind(
     play: Callable[..., list[dict[str, Any]]],
 ) -> None:
-    hidden = dict.fromkeys(("sensors_present", "sensors_enabled", "sensors_health"), HEALTH & ~RC_RECEIVER)
+    hidden: Any = dict.fromkeys(("sensors_present", "sensors_enabled", "sensors_health"), HEALTH & ~RC_RECEIVER)
     lines = play(
         step(11.0, "a firmware that does not report its radio", **hidden),
         step(15.0, "lost", (4, "Radio Failsafe"), failsafe=True, custom_mode=4),

@@ -101,6 +101,8 @@ class Scenario(NamedTuple):
     """Message id to Hz: the streams that run without a request; None: the defaults of the firmware."""
     streams_after: float = 0.0
     """Seconds from the first heartbeat of a boot until these streams begin."""
+    repeats: float | None = None
+    """Seconds after which the link sends each message once more; None: never."""
 
     @property
     def duration(self) -> float:

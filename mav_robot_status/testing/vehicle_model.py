@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
@@ -19,6 +20,8 @@ APPLET_TICK = -2
 """An entry among the streams: the applet repeats its report once a second."""
 PREARM_REPEAT = 30.0
 """Seconds after which ArduPilot repeats why it cannot arm."""
+REPEATS_FROM = 8.0
+"""Seconds after the boot from which on a link repeats messages: earlier ones look like those of another boot."""
 SAME_TIME = 1e-6
 """Tolerance of due times in seconds, because sums of intervals are not exact."""
 CATCH_UP = 10.0
@@ -58,6 +61,8 @@ class VehicleModel:
         self._loop = loop
         self._on_step = on_step
         self._out: list[Outgoing] = []
+        self._repeats: deque[tuple[float, Outgoing]] = deque()
+        """The messages that the link repeats, with the times when it does."""
         self._now = start
         self._unix_us = 0
         self._schedule: list[tuple[float, Step]] = []
@@ -118,6 +123,8 @@ class VehicleModel:
                 self._stream(min(self._due, key=self._due.__getitem__))
         self._at(now.mono, unix_at_zero)
         out, self._out = self._out, []
+        while self._repeats and self._repeats[0][0] <= now.mono:
+            out.append(self._repeats.popleft()[1])
         return out
 
     def _next_step(self) -> float:
@@ -167,7 +174,10 @@ class VehicleModel:
         if self._now < self.boot or self.ended:
             return
         if not self.silent:
-            self._out.append(Outgoing(message, self._seq))
+            outgoing = Outgoing(message, self._seq)
+            self._out.append(outgoing)
+            if self.scenario.repeats is not None and self._now >= self.boot + REPEATS_FROM:
+                self._repeats.append((self._now + self.scenario.repeats, outgoing))
         self._seq = (self._seq + 1) % 256
 
     def say(self, text: Text) -> None:

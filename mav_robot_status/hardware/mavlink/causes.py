@@ -14,6 +14,7 @@ from ...mavlink.enumerations import (
     MAV_SYS_STATUS_AHRS,
     MAV_SYS_STATUS_GEOFENCE,
     MAV_SYS_STATUS_SENSOR_BATTERY,
+    MAV_SYS_STATUS_SENSOR_GPS,
     MAV_SYS_STATUS_SENSOR_RC_RECEIVER,
     MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL,
 )
@@ -80,6 +81,12 @@ class Cause(NamedTuple):
     """Seconds after the last text."""
     worse: int | None = None
     """The code of the more severe cause. While that one is active, this one is not raised beside it."""
+    shown_by: int | None = None
+    """The bit of SYS_STATUS that shows the same condition. The latch does not end while that bit is an error."""
+
+
+def _bit(mask: int) -> int:
+    return mask.bit_length() - 1
 
 
 CAUSES: Final[dict[int, Cause]] = {
@@ -92,15 +99,21 @@ CAUSES: Final[dict[int, Cause]] = {
     HARD_LANDING: Cause("HARD_LANDING", 7, Clears.ARMING),
     EMERGENCY: Cause("EMERGENCY", 8),
     LEAK: Cause("LEAK", 9, Clears.HOLD, 45.0),
-    BATTERY_CRITICAL: Cause("BATTERY_CRITICAL", 10, Clears.FAILSAFE),
-    ESTIMATOR: Cause("ESTIMATOR", 11, Clears.FAILSAFE),
-    RC_LOST: Cause("RC_LOST", 12, Clears.FAILSAFE),
+    BATTERY_CRITICAL: Cause("BATTERY_CRITICAL", 10, Clears.FAILSAFE, shown_by=_bit(MAV_SYS_STATUS_SENSOR_BATTERY)),
+    ESTIMATOR: Cause("ESTIMATOR", 11, Clears.FAILSAFE, shown_by=_bit(MAV_SYS_STATUS_AHRS)),
+    RC_LOST: Cause("RC_LOST", 12, Clears.FAILSAFE, shown_by=_bit(MAV_SYS_STATUS_SENSOR_RC_RECEIVER)),
     GCS_LOST: Cause("GCS_LOST", 13, Clears.FAILSAFE),
-    BATTERY_LOW: Cause("BATTERY_LOW", 14, Clears.FAILSAFE, worse=BATTERY_CRITICAL),
+    BATTERY_LOW: Cause(
+        "BATTERY_LOW",
+        14,
+        Clears.FAILSAFE,
+        worse=BATTERY_CRITICAL,
+        shown_by=_bit(MAV_SYS_STATUS_SENSOR_BATTERY),
+    ),
     TERRAIN: Cause("TERRAIN", 15, Clears.FAILSAFE),
     TRAFFIC: Cause("TRAFFIC", 16, Clears.FAILSAFE),
-    GPS: Cause("GPS", 17, Clears.HOLD, 60.0),
-    GEOFENCE: Cause("GEOFENCE", 18, Clears.HOLD, 30.0),
+    GPS: Cause("GPS", 17, Clears.HOLD, 60.0, shown_by=_bit(MAV_SYS_STATUS_SENSOR_GPS)),
+    GEOFENCE: Cause("GEOFENCE", 18, Clears.HOLD, 30.0, shown_by=_bit(MAV_SYS_STATUS_GEOFENCE)),
     PRESSURE: Cause("PRESSURE", 19, Clears.HOLD, 65.0),
     TEMPERATURE: Cause("TEMPERATURE", 20, Clears.HOLD, 65.0),
     DEPTH_SENSOR: Cause("DEPTH_SENSOR", 21, Clears.HOLD, 30.0),
@@ -109,7 +122,7 @@ CAUSES: Final[dict[int, Cause]] = {
     CONFIGURATION: Cause("CONFIGURATION", 24, Clears.HOLD, 15.0),
     WATCHDOG_RESET: Cause("WATCHDOG_RESET", 25, Clears.ARMING),
     REBOOT_WHILE_ARMED: Cause("REBOOT_WHILE_ARMED", 26, Clears.ARMING),
-    FAILSAFE: Cause("FAILSAFE", 27),
+    FAILSAFE: Cause("FAILSAFE", 27, Clears.FAILSAFE),
     SYSTEM_ID_CONFLICT: Cause("SYSTEM_ID_CONFLICT", 28, Clears.HOLD, 10.0),
     LINK_LOST: Cause("LINK_LOST", 29),
     **{EXTENDED_SENSOR + bit: Cause(f"SENSOR_{EXTENDED_SENSOR_NAMES.get(bit, bit)}", 200 + bit) for bit in range(32)},
@@ -129,7 +142,7 @@ def of_sensor(bit: int) -> int:
 
 
 def _of(mask: int) -> int:
-    return of_sensor(mask.bit_length() - 1)
+    return of_sensor(_bit(mask))
 
 
 NAMED_FAILSAFES: Final = frozenset(
@@ -144,6 +157,7 @@ NAMED_FAILSAFES: Final = frozenset(
     }
 )
 """State CRITICAL means that a failsafe is active; each of these causes identifies it."""
+EVENTS: Final = frozenset(range(EVENT, EVENT + 3))
 NAMED_EMERGENCIES: Final = frozenset(range(CRASH, ATTITUDE_FAILURE + 1))
 """State EMERGENCY without one of these is EMERGENCY."""
 

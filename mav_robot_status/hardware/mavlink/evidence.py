@@ -142,6 +142,10 @@ def _gps(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     return "GPS_RAW_INT.vel", _at(state.latest.gps)
 
 
+def _attitude(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    return f"ATTITUDE: {state.turning:.2f} rad/s", _at(state.latest.attitude)
+
+
 SHOW: Final[dict[Source, Show]] = {
     Source.NONE: _nothing,
     Source.HEARTBEAT: _heartbeat("HEARTBEAT"),
@@ -165,5 +169,6 @@ SHOW: Final[dict[Source, Show]] = {
     Source.LANDED_NUMBER: _landed_number,
     Source.VELOCITY: _velocity,
     Source.GPS: _gps,
+    Source.ATTITUDE: _attitude,
 }
 assert set(SHOW) == set(Source)

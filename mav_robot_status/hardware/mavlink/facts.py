@@ -104,6 +104,8 @@ class Latched(NamedTuple):
     causes: tuple[Cause, ...]
     termination_outlived: bool
     """Whether the vehicle is still armed some time after it announced a termination."""
+    failsafe_over: bool
+    """Whether a text ended the last known failsafe, and the state in the HEARTBEAT may be older than that."""
 
 
 class SensorFault(NamedTuple):
@@ -135,6 +137,10 @@ class Facts(NamedTuple):
     movement: Movement
     receiver_stands: bool
     """Whether the GPS receiver reports that it stands still."""
+    turns: bool
+    """Whether it turns, according to the rotation alone."""
+    has_no_lift: bool
+    """Whether an aircraft that reports to be in the air has no throttle that carries it."""
     outputs: Outputs
     outputs_vetoed: bool
     """Whether a motion shows that the vehicle is driven although the outputs seem held."""

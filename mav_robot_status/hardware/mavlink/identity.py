@@ -101,6 +101,10 @@ FAMILIES: Final[dict[int, Family]] = {
 
 AIRCRAFT: Final = frozenset({*MULTIROTORS, *WINGED, mavlink.MAV_TYPE_AIRSHIP})
 """Types with a meaningful landed_state that must move to stay in the air."""
+IN_THE_AIR: Final = frozenset(
+    {mavlink.MAV_LANDED_STATE_IN_AIR, mavlink.MAV_LANDED_STATE_TAKEOFF, mavlink.MAV_LANDED_STATE_LANDING}
+)
+"""The landed_state of an aircraft that flies."""
 
 
 def is_autopilot(heartbeat: Heartbeat, component: int) -> bool:

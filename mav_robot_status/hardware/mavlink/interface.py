@@ -369,6 +369,7 @@ class MavlinkRobotHW(RobotHW):
         pass_time(state, now, self.options)
         motion.settle(state.motion, now.mono)
         motion.settle(state.gps_motion, now.mono)
+        motion.settle(state.rotation, now.mono)
         tracked.moment = moment = Moment(now.mono)
         facts = facts_of(state, moment, self.options)
         state.latest.unsettled = self._short_timeouts

@@ -23,24 +23,24 @@ COMMAND_IDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_INT, mavlink.MAVL
 WANTED_IDS: Final = frozenset(d.id for d in mav.MESSAGES.values() if d.type in HANDLERS) | COMMAND_IDS
 
 MOVES: Final[dict[type, tuple[str, ...]]] = {
-    mav.Attitude: ("outputs_vetoed",),
+    mav.Attitude: ("turns", "outputs_vetoed"),
     mav.CurrentMode: ("mode_hints",),
-    mav.EkfStatusReport: (),  # read with the next speed
+    mav.EkfStatusReport: ("turns",),  # the rest is read with the next speed
     mav.EscStatus: ("esc_turning", "outputs"),
     mav.EscTelemetry1To4: ("esc_turning", "outputs"),
     mav.EscTelemetry5To8: ("esc_turning", "outputs"),
     mav.EscTelemetry9To12: ("esc_turning", "outputs"),
-    mav.ExtendedSysState: ("landed_state",),
+    mav.ExtendedSysState: ("landed_state", "has_no_lift"),
     mav.GlobalPositionInt: ("movement",),
     mav.GpsRawInt: ("receiver_stands",),
     mav.Heartbeat: ("latched", "stop"),
     mav.MessageInterval: (),
     mav.LocalPositionNed: ("movement",),
-    mav.ParamValue: ("outputs", "outputs_vetoed", "stop_excused"),
-    mav.ServoOutputRaw: ("outputs", "outputs_vetoed"),
-    mav.SysStatus: ("sys_status", "stop", "faults"),
+    mav.ParamValue: ("has_no_lift", "outputs", "outputs_vetoed", "stop_excused"),
+    mav.ServoOutputRaw: ("has_no_lift", "outputs", "outputs_vetoed"),
+    mav.SysStatus: ("turns", "sys_status", "stop", "faults"),
     mav.SystemTime: (),
-    mav.VfrHud: ("movement", "outputs_vetoed"),
+    mav.VfrHud: ("movement", "has_no_lift", "outputs_vetoed"),
 }
 """The facts that each frequent message can change. Every other message can change any fact. A change that sets
 `LatestMessages.unsettled` is not listed: then all facts are settled. `test_message_table.py` detects an omission."""

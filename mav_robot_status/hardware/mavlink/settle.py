@@ -25,9 +25,10 @@ from .facts import (
     Stop,
     SystemStatus,
 )
-from .identity import sensor_name
+from .identity import AIRCRAFT, IN_THE_AIR
 from .state import estop, latches, outputs, sensors, text_assembly
 from .state.boot_clock import GRACE
+from .state.estimator import denied_until
 from .state.latest_messages import FRESH
 from .state.motion import SUSTAIN_OFF, SUSTAIN_ON
 from .state.speeds import driving_speed, speed_over_ground
@@ -47,10 +48,13 @@ CURRENT_MODE_FRESH: Final = 5.0
 TOGETHER: Final = 5.0
 """Seconds between a loss of RC and a failsafe that it explains."""
 
+LEAST_LIFT: Final = 10
+"""VFR_HUD.throttle in percent below which no aircraft hovers."""
+
 NO_OUTPUTS: Final = Outputs(False, False, False, False)
 NOTHING_SAID: Final = Stop(UNKNOWN, None, False)
 NO_SYS_STATUS: Final = SystemStatus(False, UNKNOWN, None, False)
-NOTHING_LATCHED: Final = Latched((), False)
+NOTHING_LATCHED: Final = Latched((), False, False)
 NO_HINTS: Final = ModeHints()
 
 
@@ -127,6 +131,27 @@ def receiver_stands(state: VehicleState, moment: Moment, options: HardwareOption
     return settled(state.gps_motion, moment) is FALSE
 
 
+def turns(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
+    """Whether it turns. The estimator's own word against it makes that unknown."""
+    return (
+        settled(state.rotation, moment) is TRUE
+        and moment.is_fresh(state.latest.attitude, FRESH)
+        and moment.has_come(denied_until(state))
+    )
+
+
+def has_no_lift(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
+    """Whether an aircraft in the air has no throttle that carries it: a hover needs more."""
+    heard, hud, watch = state.latest.extended_sys_state, state.latest.vfr_hud, state.watch
+    if heard is None or heard.message.landed_state not in IN_THE_AIR or state.vehicle_type not in AIRCRAFT:
+        return False
+    if hud is not None and hud.message.throttle < LEAST_LIFT and moment.is_fresh(hud, FRESH):
+        return True
+    named = not outputs.channels(watch, state.vehicle_type)[1]
+    at_stop = named and watch.at is not None and outputs.is_at_stop(watch, state.vehicle_type)
+    return at_stop and watch.at is not None and moment.is_within(watch.at + FRESH)
+
+
 def motor_outputs(state: VehicleState, moment: Moment, options: HardwareOptions) -> Outputs:
     """The state of the motor outputs of an armed vehicle."""
     watch = state.watch
@@ -193,26 +218,25 @@ def faults(state: VehicleState, moment: Moment, options: HardwareOptions) -> tup
         return ()
     return tuple(
         SensorFault(bit, weight is SOFT, fault.since.unix_us)
-        for bit, weight, fault in sensors.counting(state.faults, state.profile, state.heartbeats.armed)
-        if sensor_name(bit) not in options.ignore_sensors
-        and (
-            fault.messages >= sensors.DEBOUNCE_MESSAGES or moment.has_come(fault.since.mono + sensors.DEBOUNCE_SECONDS)
-        )
+        for bit, weight, fault in state.counting_faults(options)
+        if fault.messages >= sensors.DEBOUNCE_MESSAGES or moment.has_come(fault.since.mono + sensors.DEBOUNCE_SECONDS)
     )
 
 
 def latched(state: VehicleState, moment: Moment, options: HardwareOptions) -> Latched:
     """The causes that were announced and are still active."""
-    if not state.latches:
+    if not state.latches and state.failsafe_cleared is None:
         return NOTHING_LATCHED
+    errors = state.error_bits(options) if moment.is_fresh(state.latest.sys_status, options.sys_status_timeout) else ()
     lasting = tuple(
         Cause(code, latch.text, latch.since.unix_us)
         for code, latch in state.latches.items()
-        if not moment.has_come(latches.ends_at(code, latch, state.heartbeats, options.text_hold_s))
+        if not moment.has_come(latches.ends_at(code, latch, state.heartbeats, errors, options.text_hold_s))
     )
     seen = state.latest.heartbeat
     outlived = seen is not None and latches.has_outlived_termination(state.latches, state.heartbeats.armed, seen.at)
-    return Latched(lasting, outlived)
+    cleared = state.failsafe_cleared
+    return Latched(lasting, outlived, cleared is not None and seen is not None and seen.at <= cleared + latches.CLEARED)
 
 
 def explained(state: VehicleState, moment: Moment, options: HardwareOptions) -> Explained:
@@ -248,6 +272,8 @@ SETTLE: Final[dict[str, Settle]] = {
     "landed_state": landed_state,
     "movement": movement,
     "receiver_stands": receiver_stands,
+    "turns": turns,
+    "has_no_lift": has_no_lift,
     "outputs": motor_outputs,
     "outputs_vetoed": outputs_vetoed,
     "esc_turning": esc_turning,

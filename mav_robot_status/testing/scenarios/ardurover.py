@@ -65,6 +65,29 @@ RC_FAILSAFE = _scenario(
     step(15.0, "the radio is back", (6, "Radio Failsafe Cleared"), failsafe=False, sensors_health=_HEALTH),
     step(18.0, "the driver takes over in MANUAL", custom_mode=0),
 )
+GCS_FAILSAFE = _scenario(
+    "the ground station is lost in AUTO and comes back; the autopilot names the radio",
+    *_ARM_AND_DRIVE,
+    _AUTO,
+    step(
+        9.0,
+        "the ground station is lost: CRITICAL, HOLD; the radio is healthy",
+        (4, "Radio Failsafe"),
+        custom_mode=4,
+        failsafe=True,
+        velocity=_STOPPED,
+        throttle=0,
+    ),
+    step(15.0, "the ground station is back", (6, "GCS Failsafe Cleared"), failsafe=False),
+    step(18.0, "the driver takes over in MANUAL", custom_mode=0),
+)
+REPEATED_PACKETS = Scenario(
+    "a tunnel repeats packets 5 s late; no steps",
+    ARDUROVER,
+    ARDUROVER.ready,
+    streams={1: 1.0, 2: 1.0, 30: 4.0, 33: 4.0, 36: 2.0, 74: 2.0, 193: 0.5},
+    repeats=5.0,
+)
 SAFETY_SWITCH = _scenario(
     "the hardware safety switch is pressed while armed, and again",
     *_ARM_AND_DRIVE,

@@ -253,7 +253,7 @@ def test_a_boat_moves_when_it_drifts_and_not_when_it_is_rolled() -> None:
 def test_a_lost_ground_station_of_a_boat_is_the_failsafe_that_the_boat_reports() -> None:
     boat = Screening(arduboat.GCS_FAILSAFE)
     assert boat.at(8.5) == "AUTO | ? T T T F | 0"
-    assert boat.at(12.0) == "AUTO | ? T T F T | 2001"
+    assert boat.at(12.0) == "AUTO | ? T T F T | 2002"
     assert boat.flight_mode == "HOLD"
     assert boat.at(17.0) == "AUTO | ? T T F F | 0"
     assert boat.at(20.0) == "AUTO | ? T T T F | 0"

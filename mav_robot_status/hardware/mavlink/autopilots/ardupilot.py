@@ -9,6 +9,7 @@ Texts: strings checked in 4.7-dev and 4.5.6, with older wordings that occur in r
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 from ....interface.status import RobotMode
@@ -173,13 +174,14 @@ TEXTS: Final = table(
             CLEAR,
             (causes.RC_LOST, causes.GCS_LOST),
         ),
+        (r"Failsafe ended", CLEAR, (causes.RC_LOST, causes.GCS_LOST)),  # Rover up to 4.0
         (r"GCS Failsafe Off", CLEAR, (causes.GCS_LOST,)),
         (r"Failsafe\. (Short|Long) event off", CLEAR, (causes.RC_LOST, causes.GCS_LOST)),
         (r"(GPS )?Glitch cleared", CLEAR, (causes.GPS,)),
         (r"Dead Reckoning (stopped|timeout)", CLEAR, (causes.GPS,)),
         (r"Fence breach cleared", CLEAR, (causes.GEOFENCE,)),
         (r"Aborting termination", CLEAR, (causes.TERMINATION_ANNOUNCED,)),
-        (r"Vibration compensation (ON|OFF)|EKF primary changed:", IGNORE),
+        (r"Vibration compensation (ON|OFF)|EKF primary changed:|EKF\d? lane switch", IGNORE),
         # emergency stop
         (r".*Emergency Stopped", Effect.ESTOP),
         (r"RC\d+: MotorEStop HIGH", Effect.ESTOP),
@@ -197,6 +199,11 @@ TEXTS: Final = table(
         (r"Terminating due to ", CAUSE, (causes.TERMINATION_ANNOUNCED,)),
         # failsafes
         (r".*Radio \+ Battery Failsafe", CAUSE, (causes.RC_LOST,)),
+        (r"GCS \+ Battery Failsafe", CAUSE, (causes.GCS_LOST,)),  # Copter 4.0 to 4.2
+        (r"Failsafe trigger 0x1\b", CAUSE, (causes.RC_LOST,)),  # Rover up to 4.0: a mask
+        (r"Failsafe trigger 0x2\b", CAUSE, (causes.GCS_LOST,)),
+        (r"Failsafe trigger 0x3\b", CAUSE, (causes.RC_LOST, causes.GCS_LOST)),
+        (r"Failsafe trigger 0x", CAUSE, (causes.FAILSAFE,)),
         (r"Radio Failsafe|RC Failsafe|RC (Short|Long) Failsafe|Throttle failsafe on", CAUSE, (causes.RC_LOST,)),
         (r"Failsafe\. (Short|Long) event on|Lost manual control", CAUSE, (causes.RC_LOST,)),
         (r"GCS Failsafe|MYGCS: .*heartbeat lost", CAUSE, (causes.GCS_LOST,)),
@@ -262,10 +269,17 @@ ARDUPILOT: Final = Autopilot(
     ),
     states=States(uninit=Uninit.STARTING, standby_is_landed=True),
     texts=Texts(
-        rules=TEXTS, stop_text=StopText.READINESS, safety_switch=frozenset(), sends_events=False, firmware=FIRMWARE
+        rules=TEXTS,
+        stop_text=StopText.READINESS,
+        safety_switch=frozenset(),
+        sends_events=False,
+        failsafe_is_any={Family.ROVER: re.compile(r"(Radio|GCS) Failsafe")},
+        firmware=FIRMWARE,
     ),
     sensors=Sensors(
         weights=WEIGHTS,
+        # up to 4.0 a compass that the estimator does not use is unhealthy: removed in 45daff9f47
+        since={sensor_weights.bit_of(mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG): (4, 1)},
         are_monitored=True,
         faulty_needs_present=True,
         readiness_in_health_alone=False,
@@ -290,6 +304,9 @@ ARDUPILOT: Final = Autopilot(
         zero=ZeroSpeed.ESTIMATOR_HEALTHY,
         hud=HudSpeed.MOTION_AND_REST,
         needs_healthy_estimator=True,
+        denied_by=re.compile(
+            r"(PreArm|Arm): (EKF attitude is bad|AHRS:? not healthy|EKF (position|velocity|height) variance)"
+        ),
         reports_estimator=True,
     ),
     requests=Requests(

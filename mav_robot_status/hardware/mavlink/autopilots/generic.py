@@ -32,9 +32,17 @@ GENERIC: Final = Autopilot(
     recognition=Recognition(autopilots=frozenset(), lacks=None),
     modes=Modes(flight_mode=standard, overrides_key=None, initialising={}),
     states=States(uninit=Uninit.STARTING, standby_is_landed=False),
-    texts=Texts(rules=(), stop_text=StopText.STATE, safety_switch=frozenset(), sends_events=False, firmware={}),
+    texts=Texts(
+        rules=(),
+        stop_text=StopText.STATE,
+        safety_switch=frozenset(),
+        sends_events=False,
+        failsafe_is_any={},
+        firmware={},
+    ),
     sensors=Sensors(
         weights=sensor_weights.COMMON,
+        since={},
         are_monitored=True,
         faulty_needs_present=True,
         readiness_in_health_alone=False,
@@ -52,8 +60,9 @@ GENERIC: Final = Autopilot(
     ),
     speeds=Speeds(
         zero=ZeroSpeed.ALWAYS,
-        hud=HudSpeed.REST_WITH_GPS,  # INAV and Betaflight send zero without GPS
+        hud=HudSpeed.REST_WITH_GPS,  # INAV, Betaflight and others send zero for a speed that they do not know
         needs_healthy_estimator=False,
+        denied_by=None,
         reports_estimator=False,
     ),
     requests=Requests(

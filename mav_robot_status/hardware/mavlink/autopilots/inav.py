@@ -44,6 +44,7 @@ INAV: Final[Autopilot] = replace(
         zero=ZeroSpeed.GPS_HEALTHY,  # it sends zero without GPS
         hud=HudSpeed.MOTION_AND_REST,
         needs_healthy_estimator=False,
+        denied_by=None,
         reports_estimator=False,
     ),
 )

@@ -71,6 +71,7 @@ PAPARAZZI: Final[Autopilot] = replace(
         zero=ZeroSpeed.GPS_HEALTHY,
         hud=HudSpeed.MOTION_ONLY,
         needs_healthy_estimator=False,
+        denied_by=None,
         reports_estimator=False,
     ),
     requests=Requests(wanted=(), watched_families=frozenset(), once=(), boot_texts=frozenset(), streams={}),

@@ -9,6 +9,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import re
     from collections.abc import Callable, Mapping
 
     from ....mavlink.definitions import Heartbeat
@@ -58,7 +59,7 @@ class HudSpeed(Enum):
 
     MOTION_AND_REST = "its speed, as that of a position message"
     MOTION_ONLY = "motion, never rest"
-    REST_WITH_GPS = "its speed; zero counts only with GPS, unless the vehicle is an aircraft"
+    REST_WITH_GPS = "its speed; zero counts only with a healthy GPS receiver in SYS_STATUS, unless it is an aircraft"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +103,9 @@ class Texts:
     """The texts that give the safety switch as the reason not to arm."""
     sends_events: bool
     """Whether the levels of an EVENT have the meaning of STATUSTEXT severities."""
+    failsafe_is_any: Mapping[Family, re.Pattern[str]]
+    """By family, the texts about a failsafe that name radio or ground station whichever of both is lost; the text that
+    clears one clears both."""
     firmware: Mapping[str, Family]
     """The names of the firmware in the text of its boot, which gives its version, each with its kind of vehicle."""
 
@@ -112,6 +116,8 @@ class Sensors:
 
     weights: Weights
     """The meaning of a faulty bit; other bits are ignored."""
+    since: Mapping[int, Version]
+    """Bits whose health has this meaning only from a version on; older firmware means something else."""
     are_monitored: bool
     """Whether its bits ever change. If not, a SYS_STATUS without faults proves nothing."""
     faulty_needs_present: bool
@@ -151,6 +157,8 @@ class Speeds:
     hud: HudSpeed
     needs_healthy_estimator: bool
     """Whether a disarmed vehicle with a faulty AHRS has no estimate."""
+    denied_by: re.Pattern[str] | None
+    """The texts in which a disarmed autopilot says that its own estimate is wrong, repeated while it is."""
     reports_estimator: bool
     """Whether EKF_STATUS_REPORT shows if the position is measured."""
 

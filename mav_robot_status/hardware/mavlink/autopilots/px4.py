@@ -147,10 +147,12 @@ PX4: Final = Autopilot(
         stop_text=StopText.STATE,
         safety_switch=frozenset({"Preflight Fail: Press safety button first"}),
         sends_events=True,
+        failsafe_is_any={},
         firmware={},
     ),
     sensors=Sensors(
         weights=WEIGHTS,
+        since={},
         are_monitored=True,
         faulty_needs_present=False,  # a missing required component is enabled, and not present
         readiness_in_health_alone=True,
@@ -170,6 +172,7 @@ PX4: Final = Autopilot(
         zero=ZeroSpeed.ALWAYS,
         hud=HudSpeed.MOTION_ONLY,  # no position messages are sent while the estimate is not valid
         needs_healthy_estimator=False,
+        denied_by=None,
         reports_estimator=False,
     ),
     requests=Requests(

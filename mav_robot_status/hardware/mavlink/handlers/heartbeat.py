@@ -61,9 +61,10 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
             rebooted(state, boot_rules.BootClock(started), now)
     if now.mono - last > LONG_LOSS:
         state.latches, state.stop = latches.NO_LATCHES, estop.NOTHING
+        state.failsafe_cleared = None
         state.not_ready = state.failsafe = None
     if not connected:
-        state.motion, state.gps_motion = Motion(), Motion()
+        state.motion, state.gps_motion, state.rotation = Motion(), Motion(), Motion()
     if not connected or (before.armed and not heartbeats.armed):
         state.stop = state.stop._replace(ready=0)
         state.assumed_free = False
@@ -71,8 +72,9 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         _armed(state, last, now)
     if state.profile.stops.shown_by is EmergencyStop.STATE and message.system_status == MAV_STATE_FLIGHT_TERMINATION:
         state.stop = estop.NOTHING  # it shows its stops, and need not be believed on its word
-    if heartbeats.calm_since == now.mono and state.failsafe is not None:
+    if heartbeats.calm_since == now.mono:
         state.failsafe = None
+        state.latches = latches.calmed(state.latches, before.state_since.mono)
         seen.unsettled = True
 
 

@@ -6,11 +6,13 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from ....mavlink import definitions as mav
-from ....mavlink.enumerations import EKF_CONST_POS_MODE, GPS_FIX_TYPE_3D_FIX, MAV_TYPE_SURFACE_BOAT
+from ....mavlink.enumerations import EKF_ATTITUDE, EKF_CONST_POS_MODE, GPS_FIX_TYPE_3D_FIX, MAV_TYPE_SURFACE_BOAT
 from ..autopilots.profile import HudSpeed, ZeroSpeed
 from ..identity import AIRCRAFT, ROVER
 from ..state import motion, sensors
 from ..state.boot_clock import heard_clock
+from ..state.estimator import FRESH as ESTIMATOR_FRESH
+from ..state.estimator import denied_until
 from ..state.latest_messages import FRESH, Heard, heard, is_fresh
 from .heartbeat import clock_changed
 
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
 
 
 NO_SPEED: Final = 0xFFFF  # GPS_RAW_INT.vel
-ESTIMATOR_FRESH: Final = 10.0  # s
 # Module constants for code that runs many times a second: Python 3.11 is slow to look up a member of an enumeration.
 ALWAYS, ESTIMATOR_HEALTHY = ZeroSpeed.ALWAYS, ZeroSpeed.ESTIMATOR_HEALTHY
 MOTION_ONLY, REST_WITH_GPS = HudSpeed.MOTION_ONLY, HudSpeed.REST_WITH_GPS
@@ -76,7 +77,7 @@ def vfr_hud(state: VehicleState, message: mav.VfrHud, now: Instant, options: Har
         pass
     elif hud is MOTION_ONLY:
         speed = _if_fast(state, speed, options)
-    elif hud is REST_WITH_GPS and still and state.vehicle_type not in AIRCRAFT and _lacks_gps(state):
+    elif hud is REST_WITH_GPS and still and state.vehicle_type not in AIRCRAFT and not _has_gps(seen.sys_status):
         speed = None
     _moved(state, state.motion, speed, at, options)
 
@@ -103,13 +104,18 @@ def attitude(state: VehicleState, message: mav.Attitude, now: Instant, options: 
         state.turning = fastest(message.yawspeed)
     else:
         state.turning = fastest(message.yawspeed, message.rollspeed, message.pitchspeed)
+    rotation = state.rotation
+    if state.turning >= motion.RATE_OFF or rotation.slow_since is None:  # while it is at rest, nothing changes
+        motion.moved(rotation, 0.0, state.turning, state.heartbeats.armed, options, at)
 
 
 def ekf_status_report(
     state: VehicleState, message: mav.EkfStatusReport, now: Instant, options: HardwareOptions
 ) -> None:
     """EKF_STATUS_REPORT: whether the position is measured, or the estimator assumes that the vehicle stands still."""
-    state.unaided, state.unaided_at = bool(message.flags & EKF_CONST_POS_MODE), now.mono
+    flags = message.flags
+    state.unaided, state.unaided_at = bool(flags & EKF_CONST_POS_MODE), now.mono
+    state.tilted = bool(flags) and not flags & EKF_ATTITUDE  # no flags: another estimator is in use
 
 
 def system_time(state: VehicleState, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
@@ -129,12 +135,7 @@ def _speed(
     speeds = state.profile.speeds
     if still and speeds.zero is not ALWAYS and not _counts_as_rest(speeds.zero, status, nowhere):
         return None
-    if (
-        speeds.needs_healthy_estimator
-        and not state.heartbeats.armed
-        and status is not None
-        and sensors.estimate_is_faulty(status.message)
-    ):
+    if now < denied_until(state):
         return None
     return _measured(state, speed, z, nowhere, now, options) if speeds.reports_estimator else speed
 
@@ -163,11 +164,6 @@ def _measured(
 def _if_fast(state: VehicleState, speed: float, options: HardwareOptions) -> float | None:
     """`speed` if it shows motion; None if it would show rest."""
     return speed if speed > (options.v_on if state.heartbeats.armed else options.v_on_disarmed) else None
-
-
-def _lacks_gps(state: VehicleState) -> bool:
-    status = state.latest.sys_status
-    return status is not None and not _has_gps(status)
 
 
 def _has_gps(status: Heard | None) -> bool:

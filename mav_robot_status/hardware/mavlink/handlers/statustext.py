@@ -12,7 +12,9 @@ from ..autopilots import texts as text_rules
 from ..autopilots.profile import StopText
 from ..autopilots.texts import UNCLASSIFIED, Effect, When, classify
 from ..state import estop, latches, text_assembly
+from ..state.latest_messages import is_fresh
 from ..state.vehicle_state import Statement, ToldFirmware
+from . import failsafe
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -30,7 +32,15 @@ def pass_time(state: VehicleState, now: Instant, options: HardwareOptions) -> No
         for text in overdue:
             _said(state, text, now)
     if state.latches:
-        state.latches = latches.lasting(state.latches, state.heartbeats, now.mono, options.text_hold_s)
+        state.latches = latches.lasting(
+            state.latches, state.heartbeats, _error_bits(state, now.mono, options), now.mono, options.text_hold_s
+        )
+
+
+def _error_bits(state: VehicleState, now: float, options: HardwareOptions) -> frozenset[int]:
+    """The bits of a fresh SYS_STATUS that are errors."""
+    is_recent = is_fresh(state.latest.sys_status, now, options.sys_status_timeout)
+    return state.error_bits(options) if is_recent else frozenset()
 
 
 def statustext_(state: VehicleState, message: Statustext, now: Instant, options: HardwareOptions) -> None:
@@ -59,10 +69,9 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
     if effect is Effect.CAUSE and not _counts(rule.when, state):
         effect = Effect.DETAIL if state.heartbeats.armed else Effect.READINESS
     if effect is Effect.CAUSE:
-        for code in rule.codes:
-            state.latches = latches.announce(state.latches, code, words, now)
+        failsafe.announced(state, words, rule.codes, now)
     elif effect is Effect.CLEAR:
-        state.latches = latches.clear(state.latches, rule.codes)
+        failsafe.cleared(state, words, rule.codes, now.mono)
     elif effect in (Effect.ESTOP, Effect.RELEASE):
         honoured_by = state.profile.stops.honoured_by
         if honoured_by is not None and state.heartbeats.armed and state.family not in honoured_by:
@@ -76,6 +85,9 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
             state.not_ready = _say(state.not_ready, words, now)
     elif effect is Effect.READINESS:
         state.not_ready = _say(state.not_ready, words, now)
+        denied_by = state.profile.speeds.denied_by
+        if denied_by is not None and denied_by.match(words):
+            state.denied_at = now.mono
     elif effect is Effect.DETAIL:
         state.failsafe = _say(state.failsafe, words, now)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from ....interface.status import TriState
@@ -10,6 +11,7 @@ from .. import causes
 from ..autopilots import shown_by
 from ..state import estop, latches, sensors
 from ..state.latest_messages import heard
+from . import failsafe
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -30,10 +32,12 @@ def sys_status(state: VehicleState, message: SysStatus, now: Instant, options: H
         _watch_rc(state, message, now)
     seen = state.latest
     seen.sys_status = heard(seen, message, now.mono, seen.sys_status)
+    if state.latches:
+        failsafe.radio_heard(state, now.mono)
     state.stop = estop.heard_sys_status(state.stop, message, state.heartbeats, profile, now.mono)
     state.faults = sensors.heard_faults(state.faults, sensors.faulty_mask(message, profile), now)
     if state.not_ready is not None and sensors.readiness(message, profile) is TriState.TRUE:
-        state.not_ready = None
+        state.not_ready, state.denied_at = None, -math.inf
         seen.unsettled = True
     if profile.sensors.counts_internal_errors and (message.errors_count1 or message.errors_count2):
         state.internal_errors_since = state.internal_errors_since or now

@@ -65,7 +65,7 @@ def _of_state(facts: Facts, found: Collection[int]) -> Iterator[Error]:
     if state == MAV_STATE_CRITICAL and not causes.NAMED_FAILSAFES.intersection(found):
         if facts.sys_status.rc_lost_with_state:
             yield _error(causes.RC_LOST, words, since, Source.STATE_AND_RC)
-        else:
+        elif not facts.latched.failsafe_over:
             yield _error(causes.FAILSAFE, words, since, Source.STATE)
 
 

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from ....mavlink.enumerations import (
-    MAV_LANDED_STATE_IN_AIR,
-    MAV_LANDED_STATE_LANDING,
-    MAV_LANDED_STATE_ON_GROUND,
-    MAV_LANDED_STATE_TAKEOFF,
-    MAV_LANDED_STATE_UNDEFINED,
-    MAV_STATE_STANDBY,
-)
-from ..identity import AIRCRAFT
+from ....mavlink.enumerations import MAV_LANDED_STATE_ON_GROUND, MAV_LANDED_STATE_UNDEFINED, MAV_STATE_STANDBY
+from ..identity import AIRCRAFT, IN_THE_AIR
 from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 
 if TYPE_CHECKING:
     from ..facts import Facts
     from ..options import HardwareOptions
-
-IN_THE_AIR: Final = frozenset({MAV_LANDED_STATE_IN_AIR, MAV_LANDED_STATE_TAKEOFF, MAV_LANDED_STATE_LANDING})
 
 
 def in_motion(facts: Facts, options: HardwareOptions) -> Finding:
@@ -28,6 +19,8 @@ def in_motion(facts: Facts, options: HardwareOptions) -> Finding:
     landed = facts.landed_state if facts.fresh.landed_state else MAV_LANDED_STATE_UNDEFINED
     on_ground = aircraft and landed == MAV_LANDED_STATE_ON_GROUND
     if facts.armed and aircraft and landed in IN_THE_AIR and options.hover_is_motion:
+        if facts.has_no_lift and _is_still(facts):
+            return UNKNOWN, Reason("airborne, but still and without the throttle to fly", Source.LANDED_NUMBER)
         return TRUE, Reason("airborne", Source.LANDED_NUMBER)
     value, why = _measured(facts, on_ground)
     if why.source is Source.NONE:
@@ -49,11 +42,18 @@ def _measured(facts: Facts, on_ground: bool) -> Finding:
             rule = "disarmed: the estimate moves, the GPS receiver stands still"
             return UNKNOWN, Reason(rule, Source.VELOCITY)
         return facts.movement.value, Reason("speed and rotation, with hysteresis", Source.VELOCITY)
+    if facts.turns:
+        return TRUE, Reason("it turns, no speed known", Source.ATTITUDE)
     if on_ground:
         return FALSE, Reason("on the ground, no speed known", Source.LANDED_STATE)
     if _receiver_stands(facts):
         return FALSE, Reason("no estimate, but the GPS receiver stands still", Source.GPS)
     return UNKNOWN, Reason("no fresh speed")
+
+
+def _is_still(facts: Facts) -> bool:
+    """Whether the estimate shows rest."""
+    return facts.fresh.velocity is not None and facts.movement.is_measured and facts.movement.value is FALSE
 
 
 def _receiver_stands(facts: Facts) -> bool:

@@ -35,6 +35,7 @@ class Source(Enum):
     LANDED_NUMBER = "EXTENDED_SYS_STATE with its number"
     VELOCITY = "the message that gives the speed"
     GPS = "GPS_RAW_INT"
+    ATTITUDE = "ATTITUDE"
 
 
 class Reason(NamedTuple):

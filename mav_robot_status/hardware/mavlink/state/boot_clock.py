@@ -1,7 +1,8 @@
 """When the autopilot booted, from its own clock, and whether it has rebooted.
 
 Sources: MAVLink developer guide, routing: `SYSTEM_TIME.time_boot_ms` going back means a reboot. Any message with
-time_boot_ms can be used. A step back counts when the next sample confirms it: repeated packets do not confirm it.
+time_boot_ms can be used. A step back counts when the next sample confirms it: packets repeated in reverse order do not.
+A boot cannot be earlier than the last sample of the run before it: a tunnel repeated packets 4 to 6 s late (recorded).
 """
 
 from __future__ import annotations
@@ -13,6 +14,10 @@ STEP_BACK_MS: Final = 2000
 STEP_BACK: Final = STEP_BACK_MS / 1000  # seconds
 WRAP: Final = 1 << 32  # of a clock of 32 bits, after 49 days
 HALF: Final = WRAP // 2
+LATEST: Final = 15.0
+"""Seconds by which packets are repeated at most. A clock that is farther behind is that of another autopilot."""
+DRIFT: Final = 0.05
+"""The error of a clock, as a part of its time, at most STEP_BACK: a simulation may run slower than its clock."""
 GRACE: Final = 10.0
 """Seconds after boot during which sensor bits raise no error."""
 
@@ -52,7 +57,19 @@ def heard_clock(boot: BootClock, time_boot_ms: int, now: float) -> bool:
     if boot.doubt_ms is None or (time_boot_ms - boot.doubt_ms + HALF) % WRAP < HALF:
         boot.doubt_ms = time_boot_ms
         return False
+    if _is_repeated(boot, clock_ms, booted):
+        boot.doubt_ms = None
+        return False
     boot.in_turn = boot.shown is not None and abs(booted - boot.shown) < STEP_BACK_MS / 1000
     boot.at, boot.clock_ms, boot.doubt_ms, boot.shown = booted, time_boot_ms, None, booted
     boot.rebooted = True
     return True
+
+
+def _is_repeated(boot: BootClock, clock_ms: int, booted: float) -> bool:
+    """Whether a step back to a clock that started at `booted` shows old packets: its boot lies within the present run.
+
+    The last sample was sent at `clock_ms` after the boot of this run, whenever it arrived.
+    """
+    run = clock_ms / 1000
+    return booted - boot.at < min(run - min(STEP_BACK, DRIFT * run), LATEST)

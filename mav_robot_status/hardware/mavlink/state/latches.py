@@ -6,10 +6,10 @@ A text or an event sets a latch. Each latch also ends without the text that clea
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ..causes import CAUSES, TERMINATION_ANNOUNCED, TIMED_TEXTS, Clears
+from ..causes import CAUSES, EVENTS, TERMINATION_ANNOUNCED, TIMED_TEXTS, Clears
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 
 TERMINATING: Final = 1.5
 """Seconds after the announcement of a termination in which a heartbeat may be older than the termination."""
+
+
+TOGETHER: Final = 2.0
+"""Seconds before the state CRITICAL in which an event tells of the same failsafe: the HEARTBEAT follows it."""
+CLEARED: Final = 1.5
+"""Seconds after a text that ends a failsafe in which a HEARTBEAT may be older than that end."""
 
 
 class Latch(NamedTuple):
@@ -60,16 +66,31 @@ def clear(latches: Latches, codes: tuple[int, ...]) -> Latches:
     return {code: latch for code, latch in latches.items() if code not in codes}
 
 
-def lasting(latches: Latches, heartbeats: HeartbeatHistory, now: float, text_hold: float) -> Latches:
+def calmed(latches: Latches, critical_since: float) -> Latches:
+    """`latches` after a state CRITICAL has ended: events tell of the failsafe that has begun and ended with it."""
+    return {
+        code: latch for code, latch in latches.items() if code not in EVENTS or latch.last < critical_since - TOGETHER
+    }
+
+
+def lasting(
+    latches: Latches, heartbeats: HeartbeatHistory, errors: Collection[int], now: float, text_hold: float
+) -> Latches:
     """The latches that are still active at `now`, by time and by the state of the vehicle."""
     if not latches:
         return latches
-    return {code: latch for code, latch in latches.items() if now < ends_at(code, latch, heartbeats, text_hold)}
+    return {code: latch for code, latch in latches.items() if now < ends_at(code, latch, heartbeats, errors, text_hold)}
 
 
-def ends_at(code: int, latch: Latch, heartbeats: HeartbeatHistory, text_hold: float) -> float:
-    """When (monotonic seconds) a latch ends without further messages; inf: never."""
+def ends_at(code: int, latch: Latch, heartbeats: HeartbeatHistory, errors: Collection[int], text_hold: float) -> float:
+    """When (monotonic seconds) a latch ends without further messages; inf: never.
+
+    `errors` are the bits of SYS_STATUS that are errors: a latch does not end before the bit of its condition, whose
+    code would be less exact.
+    """
     cause = CAUSES[code]
+    if cause.shown_by in errors:
+        return math.inf
     if cause.clears is Clears.FAILSAFE:
         if heartbeats.calm_since is None:
             return math.inf

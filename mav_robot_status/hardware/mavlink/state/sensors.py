@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ....clock import Instant
     from ....mavlink.definitions import SysStatus
     from ..autopilots import Autopilot
+    from ..autopilots.firmware import Firmware
 
 GPS: Final = mavlink.MAV_SYS_STATUS_SENSOR_GPS
 MOTOR_OUTPUTS: Final = mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
@@ -73,12 +74,19 @@ def heard_faults(faults: Faults, mask: int, now: Instant) -> Faults:
     return after
 
 
-def counting(faults: Faults, profile: Autopilot, armed: bool) -> list[tuple[int, Weight, Fault]]:
-    """The faults with a meaning, after debouncing: (bit, weight, fault); SOFT ones only while armed."""
-    weights = profile.sensors.weights
+def counting(
+    faults: Faults, profile: Autopilot, firmware: Firmware | None, armed: bool
+) -> list[tuple[int, Weight, Fault]]:
+    """The faults with a meaning: (bit, weight, fault); SOFT ones only while armed.
+
+    A bit whose health means something else in this version of the firmware has none. Without a version it has.
+    """
+    weights, since = profile.sensors.weights, profile.sensors.since
     out = []
     for bit, fault in faults.items():
         weight = HARD if bit - 32 in EXTENDED_BITS else weights.get(bit)
+        if bit in since and firmware is not None and firmware < since[bit]:
+            continue
         if weight is HARD or (weight is SOFT and armed):
             out.append((bit, weight, fault))
     return out

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ....clock import Instant
 from ..autopilots import announced_as
-from ..identity import Family, family_of
+from ..identity import Family, family_of, sensor_name
 from . import estop, latches, outputs, sensors, text_assembly
 from .boot_clock import BootClock
 from .heartbeat_history import HeartbeatHistory, first_heartbeat
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from ..autopilots import Autopilot
     from ..autopilots.firmware import Firmware
     from ..autopilots.modes import AvailableMode
+    from ..autopilots.sensor_weights import Weight
+    from ..options import HardwareOptions
 
 
 class Statement(NamedTuple):
@@ -66,8 +68,14 @@ class VehicleState:
     """Whether ArduPilot's estimator reports that its position is not measured."""
     unaided_at: float = -math.inf
     """The time of the latest such report."""
+    tilted: bool = False
+    """Whether that report lacks an attitude: nothing that the estimator says is right then."""
+    denied_at: float = -math.inf
+    """When the autopilot last said in a text that its estimate is wrong; monotonic seconds."""
     turning: float = 0.0
     """The rotation in the latest ATTITUDE, rad/s."""
+    rotation: Motion = field(default_factory=Motion)
+    """The motion according to rotation alone. Its FALSE means nothing."""
     watch: outputs.Watch = field(default_factory=outputs.Watch)
     switches: Mapping[int, int] = field(default_factory=dict)
     """RCn_OPTION by channel, as far as received."""
@@ -79,6 +87,8 @@ class VehicleState:
     """The reason why it cannot be armed."""
     failsafe: Statement | None = None
     """The text about a failsafe that its state reports."""
+    failsafe_cleared: float | None = None
+    """When a text ended the last known failsafe, monotonic seconds."""
     internal_errors_since: Instant | None = None
     rc_lost_since: Instant | None = None
     """When PX4's RC_RECEIVER bit turned unhealthy; without RC it is so for a whole flight."""
@@ -103,6 +113,19 @@ class VehicleState:
     def __post_init__(self) -> None:
         self.profile = self.shown or announced_as(self.autopilot)
         self.family = family_of(self.vehicle_type)
+
+    def counting_faults(self, options: HardwareOptions) -> list[tuple[int, Weight, sensors.Fault]]:
+        """The faults in SYS_STATUS that have a meaning for this vehicle, at this site."""
+        firmware = self.firmware and self.firmware.firmware
+        return [
+            found
+            for found in sensors.counting(self.faults, self.profile, firmware, self.heartbeats.armed)
+            if sensor_name(found[0]) not in options.ignore_sensors
+        ]
+
+    def error_bits(self, options: HardwareOptions) -> frozenset[int]:
+        """The bits of SYS_STATUS that are errors."""
+        return frozenset(bit for bit, _, _ in self.counting_faults(options)) if self.faults else frozenset()
 
     def become(self, other: VehicleState) -> None:
         """Replace everything by the contents of `other`."""

@@ -16,7 +16,7 @@ from mav_robot_status.hardware.mavlink.handlers import HANDLERS
 from mav_robot_status.mavlink import definitions as mav
 
 from . import driver
-from .driver import ACTIVE, CRITICAL, FITTED, GYRO, PREARM, TERMINATED, Flight, copter, px4, rover
+from .driver import ACTIVE, AHRS, CRITICAL, FITTED, GYRO, PREARM, TERMINATED, Flight, copter, px4, rover
 from .random_flights import MESSAGES, fly
 from .settled import ROWS, Changes, Mark, Witness, ignore_table, marks, omissions, switch_off
 from .test_sequences import Outputs
@@ -68,6 +68,27 @@ def a_copter_climbs_while_its_outputs_are_held_and_then_drives_them() -> None:
     flight = held(copter(), [1000] * 4, [1632] * 4)
     flight.stop("vfr_hud", "outputs").send(mav.VfrHud(0.0, 2.0, 100))
     flight.send(mav.ServoOutputRaw._make((*[1632] * 8, 0, *[0] * 8)))
+
+
+def a_turning_copter_says_that_its_estimate_is_wrong() -> None:
+    flight = copter()
+    flight.set(health=FITTED | AHRS)
+    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0, 0, 1.0), hz=4).wait(3)
+    flight.send(mav.EkfStatusReport(0x400)).send(mav.EkfStatusReport(0x33F))
+    flight.set(health=FITTED & ~AHRS).wait(3)
+
+
+def a_plane_in_the_air_has_its_throttle_at_stop_and_lands() -> None:
+    flight = Flight(driver.ARDUPILOT, driver.PLANE)
+    outputs = Outputs(flight, [1000] * 4)
+    flight.send(mav.ParamValue(70.0, 0, 0, b"SERVO3_FUNCTION", 2)).wait(5)
+    flight.stream("landed", lambda: mav.ExtendedSysState(0, 2)).hb(armed=True, state=ACTIVE)
+    outputs.set([1632] * 4, 39)
+    flight.wait(3)
+    outputs.set([1000] * 4, 39)
+    flight.wait(3)
+    flight.send(mav.ParamValue(0.0, 0, 0, b"SERVO3_FUNCTION", 2)).wait(1)
+    flight.send(mav.ParamValue(70.0, 0, 0, b"SERVO3_FUNCTION", 2)).stop("landed").send(mav.ExtendedSysState(0, 1))
 
 
 def a_motor_is_driven_after_a_stop_was_announced() -> None:
@@ -141,6 +162,8 @@ STORIES: Final[list[Callable[[], Any]]] = [
     ),
     parameters_arrive_while_a_motor_turns,
     a_copter_climbs_while_its_outputs_are_held_and_then_drives_them,
+    a_turning_copter_says_that_its_estimate_is_wrong,
+    a_plane_in_the_air_has_its_throttle_at_stop_and_lands,
     a_motor_is_driven_after_a_stop_was_announced,
     an_autopilot_shows_late_that_it_is_inav,
     internal_errors_end_after_they_were_announced,

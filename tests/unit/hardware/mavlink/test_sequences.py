@@ -141,7 +141,7 @@ def test_a_crash_stays_until_the_next_arming() -> None:
 
 def test_a_cleared_text_ends_a_failsafe() -> None:
     """Q07"""
-    flight = rover()
+    flight = copter()
     flight.wait(12)
     flight.hb(armed=True, state=CRITICAL).text("Radio Failsafe")
     assert flight.code == 2001

@@ -25,6 +25,7 @@ ARDUPILOT: list[tuple[str, Effect, tuple[int, ...]]] = [
     ("Terrain Failsafe Cleared", CLEAR, (2006,)),
     ("Short Failsafe Cleared", CLEAR, (2001, 2002)),
     ("RC Long Failsafe Cleared", CLEAR, (2001, 2002)),
+    ("Failsafe ended", CLEAR, (2001, 2002)),
     ("GCS Failsafe Off", CLEAR, (2002,)),
     ("Throttle failsafe off", CLEAR, (2001, 2002)),
     ("Failsafe. Short event off", CLEAR, (2001, 2002)),
@@ -38,6 +39,7 @@ ARDUPILOT: list[tuple[str, Effect, tuple[int, ...]]] = [
     ("Vibration compensation ON", IGNORE, ()),
     ("Vibration compensation OFF", IGNORE, ()),
     ("EKF primary changed:1", IGNORE, ()),
+    ("EKF3 lane switch 1", IGNORE, ()),
     # emergency stop
     ("PreArm: Motors Emergency Stopped", ESTOP, ()),
     ("Arm: Motors Emergency Stopped", ESTOP, ()),
@@ -65,6 +67,11 @@ ARDUPILOT: list[tuple[str, Effect, tuple[int, ...]]] = [
     ("Terminating due to GCS request", CAUSE, (1002,)),
     # failsafes
     ("Radio + Battery Failsafe - Disarming", CAUSE, (2001,)),
+    ("GCS + Battery Failsafe - Landing", CAUSE, (2002,)),
+    ("Failsafe trigger 0x1", CAUSE, (2001,)),
+    ("Failsafe trigger 0x2", CAUSE, (2002,)),
+    ("Failsafe trigger 0x3", CAUSE, (2001, 2002)),
+    ("Failsafe trigger 0x10", CAUSE, (2000,)),
     ("Radio Failsafe", CAUSE, (2001,)),
     ("Radio Failsafe - Disarming", CAUSE, (2001,)),
     ("RC Failsafe", CAUSE, (2001,)),

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pytest
+
 from mav_robot_status.hardware.mavlink.state.boot_clock import WRAP, BootClock, heard_clock
 
 
@@ -37,6 +39,31 @@ def test_a_single_late_packet_is_not_a_reboot() -> None:
 
 def test_packets_repeated_in_reverse_order_are_not_a_reboot() -> None:
     assert clocked((1000.0, 900_000), (1001.0, 890_000), (1001.1, 880_000), (1001.2, 870_000))[1] == 0
+
+
+@pytest.mark.parametrize("late", [4.0, 5.0, 6.0, 10.0])
+@pytest.mark.parametrize("uptime", [20.0, 900.0, 100_000.0])
+def test_packets_repeated_in_order_are_not_a_reboot(late: float, uptime: float) -> None:
+    live = [(tick / 4, round((uptime + tick / 4) * 1000)) for tick in range(400)]
+    again = [(at + late, clock_ms) for at, clock_ms in live if 20 <= at < 40]
+    boot, reboots = clocked(*sorted(live + again))
+    assert reboots == 0
+    assert boot.at == -uptime
+
+
+def test_packets_repeated_with_changing_delay_are_not_a_reboot() -> None:
+    live = [(tick / 4, 60_000 + tick * 250) for tick in range(400)]
+    again = [(at + 4 + n % 5 / 2, clock_ms) for n, (at, clock_ms) in enumerate(live[80:160])]
+    assert clocked(*sorted(live + again))[1] == 0
+
+
+@pytest.mark.parametrize("uptime", [3.0, 8.0, 20.0, 900.0])
+@pytest.mark.parametrize("gap", [0.5, 1.2, 30.0])
+def test_a_boot_after_the_last_sample_is_a_reboot(uptime: float, gap: float) -> None:
+    last = (uptime, round(uptime * 1000))
+    assert clocked((uptime - 1, last[1] - 1000), last, (uptime + gap + 0.3, 300), (uptime + gap + 0.6, 600))[1] == int(
+        last[1] - 300 > 2000
+    )
 
 
 def test_a_small_step_back_changes_nothing() -> None:

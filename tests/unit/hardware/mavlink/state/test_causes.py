@@ -45,7 +45,7 @@ FLYING = heartbeats((0, True, ACTIVE))
 
 def announced(code: int, hold: float = 10.0, after: float = 0.0, at: HeartbeatHistory = FLYING) -> bool:
     """Whether a cause announced at NOW lasts `after` seconds."""
-    return code in lasting(announce(NO_LATCHES, code, "words", NOW), at, NOW.mono + after, hold)
+    return code in lasting(announce(NO_LATCHES, code, "words", NOW), at, (), NOW.mono + after, hold)
 
 
 def test_every_code_has_the_name_of_the_specification() -> None:

@@ -75,8 +75,8 @@ def test_one_healthy_message_restarts_the_fault_count() -> None:
 def test_a_soft_fault_counts_only_while_armed_an_extended_one_always_an_unlisted_one_never() -> None:
     mask = 1 << 5 | 1 << 9 | 1 << 33 | 1 << 50
     faults = sensors.heard_faults(sensors.heard_faults(sensors.NO_FAULTS, mask, NOW), mask, NOW)
-    assert [bit for bit, *_ in sensors.counting(faults, ARDUPILOT, True)] == [5, 33]
-    assert [bit for bit, *_ in sensors.counting(faults, ARDUPILOT, False)] == [33]
+    assert [bit for bit, *_ in sensors.counting(faults, ARDUPILOT, None, True)] == [5, 33]
+    assert [bit for bit, *_ in sensors.counting(faults, ARDUPILOT, None, False)] == [33]
 
 
 def test_px4_shows_readiness_in_the_health_mask_only() -> None:

@@ -1,0 +1,31 @@
+"""What the estimator says about itself. A disarmed vehicle at rest was seen with 14 m/s while it said that it is wrong.
+
+Sources: recorded; ArduPilot, `AP_Arming` (a failed check is repeated every 30 s) and `AP_AHRS::send_ekf_status_report`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from . import sensors
+from .estop import REPEATED
+
+if TYPE_CHECKING:
+    from .vehicle_state import VehicleState
+
+FRESH: Final = 10.0
+"""Seconds for which an EKF_STATUS_REPORT is valid."""
+
+
+def denied_until(state: VehicleState) -> float:
+    """Until when (monotonic seconds) the estimate of a disarmed vehicle is wrong by its estimator's own word: in
+    SYS_STATUS, in a text of the pre-arm checks, or in EKF_STATUS_REPORT. -inf: it is not; inf: until another message.
+    """
+    if not state.profile.speeds.needs_healthy_estimator or state.heartbeats.armed:
+        return -math.inf
+    status = state.latest.sys_status
+    if status is not None and sensors.estimate_is_faulty(status.message):
+        return math.inf
+    said = state.denied_at + REPEATED
+    return max(said, state.unaided_at + FRESH) if state.tilted else said

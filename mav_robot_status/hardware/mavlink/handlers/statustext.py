@@ -12,7 +12,7 @@ from ..autopilots import texts as text_rules
 from ..autopilots.profile import StopText
 from ..autopilots.texts import UNCLASSIFIED, Effect, When, classify
 from ..state import estop, latches, text_assembly
-from ..state.vehicle_state import Statement, ToldFirmware
+from ..state.vehicle_state import Statement, ToldFirmware, honours_stop
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -64,8 +64,7 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
     elif effect is Effect.CLEAR:
         state.latches = latches.clear(state.latches, rule.codes)
     elif effect in (Effect.ESTOP, Effect.RELEASE):
-        honoured_by = state.profile.stops.honoured_by
-        if honoured_by is not None and state.heartbeats.armed and state.family not in honoured_by:
+        if state.profile.stops.outputs_show and state.heartbeats.armed and not honours_stop(state):
             return
         engaged = effect is Effect.ESTOP
         state.stop = estop.said(state.stop, engaged, words, now)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ....clock import Instant
     from ....mavlink.definitions import SysStatus
     from ..autopilots import Autopilot
-    from ..autopilots.profile import Version
+    from ..autopilots.firmware import Firmware
     from ..identity import Family
     from .heartbeat_history import HeartbeatHistory
 
@@ -111,7 +111,7 @@ def unsure(stop: Stop, why: str, now: float) -> Stop:
     return NOTHING
 
 
-def includes_stop(profile: Autopilot, family: Family, version: Version | None, reports_mission: bool) -> bool:
+def includes_stop(profile: Autopilot, family: Family, version: Firmware | None, reports_mission: bool) -> bool:
     """Whether the pre-arm checks of this firmware fail while a stop is engaged.
 
     Without a known `version` its least value follows from what the firmware sends: PREARM_CHECK in SYS_STATUS, or

@@ -4,6 +4,7 @@ import pytest
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.hardware.mavlink.autopilots import ARDUPILOT, PX4, Autopilot
+from mav_robot_status.hardware.mavlink.autopilots.firmware import Firmware
 from mav_robot_status.hardware.mavlink.identity import Family
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.state.estop import (
@@ -35,7 +36,7 @@ def beaten(armed: bool = False) -> HeartbeatHistory:
 
 def heard(stop: Stop, *messages: tuple[float, SysStatus], profile: Autopilot = ARDUPILOT, armed: bool = False) -> Stop:
     for seconds, status in messages:
-        checked = includes_stop(profile, Family.COPTER, (4, 5), False)
+        checked = includes_stop(profile, Family.COPTER, Firmware(4, 5), False)
         stop = heard_sys_status(stop, status, beaten(armed), profile, checked, NOW.mono + seconds)
     return stop
 

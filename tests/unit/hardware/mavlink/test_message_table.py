@@ -21,7 +21,7 @@ from .random_flights import MESSAGES, fly
 from .settled import ROWS, Changes, Mark, Witness, ignore_table, marks, omissions, switch_off
 from .test_sequences import Outputs
 
-SEEDS: Final = range(4)
+SEEDS: Final = range(6)
 
 
 def held(flight: Flight, stop: list[int], driven: list[int]) -> Flight:

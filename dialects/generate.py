@@ -40,8 +40,8 @@ USED = (
     "HEARTBEAT SYS_STATUS SYSTEM_TIME SET_MODE PARAM_REQUEST_READ PARAM_VALUE GPS_RAW_INT ATTITUDE "
     "LOCAL_POSITION_NED GLOBAL_POSITION_INT SERVO_OUTPUT_RAW REQUEST_DATA_STREAM VFR_HUD COMMAND_INT COMMAND_LONG "
     "COMMAND_ACK AUTOPILOT_VERSION MESSAGE_INTERVAL EXTENDED_SYS_STATE NAMED_VALUE_FLOAT NAMED_VALUE_INT STATUSTEXT "
-    "ESC_STATUS EVENT AVAILABLE_MODES CURRENT_MODE AVAILABLE_MODES_MONITOR EKF_STATUS_REPORT ESC_TELEMETRY_1_TO_4 "
-    "ESC_TELEMETRY_5_TO_8 ESC_TELEMETRY_9_TO_12 ROBOT_STATUS"
+    "ESC_STATUS EVENT MISSION_CURRENT RC_CHANNELS AVAILABLE_MODES CURRENT_MODE AVAILABLE_MODES_MONITOR "
+    "EKF_STATUS_REPORT ESC_TELEMETRY_1_TO_4 ESC_TELEMETRY_5_TO_8 ESC_TELEMETRY_9_TO_12 ROBOT_STATUS"
 ).split()
 
 # Fields that the gateway does not read, in messages that are frequent or have many fields. Frames that we send have
@@ -57,6 +57,8 @@ UNREAD = {
     "VFR_HUD": "airspeed alt heading",
     "EKF_STATUS_REPORT": "velocity_variance pos_horiz_variance pos_vert_variance compass_variance terrain_alt_variance "
     "airspeed_variance",
+    "MISSION_CURRENT": "seq total mission_mode",
+    "RC_CHANNELS": "time_boot_ms chancount rssi",
     "AUTOPILOT_VERSION": "capabilities uid middleware_sw_version os_sw_version board_version vendor_id product_id "
     "flight_custom_version middleware_custom_version os_custom_version uid2",
 }

@@ -202,14 +202,23 @@ class LinkHub:
         elif frame.message_id in COMMAND_IDS:
             if endpoint.is_peer(channel) and verdict in (None, Verdict.VERIFIED):
                 self._handle_command(frame, channel)
-            if endpoint.is_out:
-                return self._router is not None  # a command that is forwarded to a vehicle
+            return self._is_delivered(frame, channel, now.mono)
         if endpoint.is_out:
             return False
         if verdict is Verdict.VERIFIED:  # its time stamp proves that it is newer than all before, on every path
             self.paths.take(frame.ids, channel, now.mono)
             return True
         return self._is_on_path(frame, channel, now.mono)
+
+    def _is_delivered(self, frame: Frame, channel: Channel, now: float) -> bool:
+        """Whether a command reaches the vehicle: it arrived on the vehicle's own path, or is forwarded there."""
+        system = frame.message.target_system
+        paths = {self.paths.channel(ids) for ids in self.paths.vehicles() if ids[0] == system}
+        if channel in paths:
+            return True
+        if self._router is None or not channel.endpoint.is_peer(channel) or self._channels is None:
+            return False
+        return not paths.isdisjoint(self._router.destinations(frame, channel, self._channels, now))
 
     def _is_on_path(self, frame: Frame, channel: Channel, now: float) -> bool:
         """Whether a frame arrived on the selected path of its vehicle. Notes conflicts."""

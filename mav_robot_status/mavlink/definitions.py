@@ -253,6 +253,35 @@ class Event(NamedTuple):
     arguments: bytes
 
 
+class MissionCurrent(NamedTuple):
+    """MISSION_CURRENT, id 42; the known fields in wire order, arrays as raw bytes."""
+
+    mission_state: int
+
+
+class RcChannels(NamedTuple):
+    """RC_CHANNELS, id 65; the known fields in wire order, arrays as raw bytes."""
+
+    chan1_raw: int
+    chan2_raw: int
+    chan3_raw: int
+    chan4_raw: int
+    chan5_raw: int
+    chan6_raw: int
+    chan7_raw: int
+    chan8_raw: int
+    chan9_raw: int
+    chan10_raw: int
+    chan11_raw: int
+    chan12_raw: int
+    chan13_raw: int
+    chan14_raw: int
+    chan15_raw: int
+    chan16_raw: int
+    chan17_raw: int
+    chan18_raw: int
+
+
 class AvailableModes(NamedTuple):
     """AVAILABLE_MODES, id 435; the known fields in wire order, arrays as raw bytes."""
 
@@ -368,6 +397,8 @@ MESSAGES: Final[dict[int, Definition]] = {
     253: Definition(253, "STATUSTEXT", 54, Struct("<B50sHB"), Statustext),
     291: Definition(291, "ESC_STATUS", 57, Struct("<Q16s16s16sB"), EscStatus),
     410: Definition(410, "EVENT", 53, Struct("<IIHBBB40s"), Event),
+    42: Definition(42, "MISSION_CURRENT", 6, Struct("<4xB"), MissionCurrent),
+    65: Definition(65, "RC_CHANNELS", 42, Struct("<4xHHHHHHHHHHHHHHHHHH"), RcChannels),
     435: Definition(435, "AVAILABLE_MODES", 46, Struct("<IIBBB35s"), AvailableModes),
     436: Definition(436, "CURRENT_MODE", 9, Struct("<IIB"), CurrentMode),
     437: Definition(437, "AVAILABLE_MODES_MONITOR", 1, Struct("<B"), AvailableModesMonitor),

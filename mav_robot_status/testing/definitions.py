@@ -58,10 +58,12 @@ __all__ = [
     "Heartbeat",
     "LocalPositionNed",
     "MessageInterval",
+    "MissionCurrent",
     "NamedValueFloat",
     "NamedValueInt",
     "ParamRequestRead",
     "ParamValue",
+    "RcChannels",
     "RequestDataStream",
     "RobotStatus",
     "ServoOutputRaw",
@@ -204,6 +206,41 @@ class AutopilotVersion(NamedTuple):
     uid2: bytes
 
 
+class MissionCurrent(NamedTuple):
+    """MISSION_CURRENT, id 42; all fields in wire order, arrays as raw bytes."""
+
+    seq: int
+    total: int
+    mission_state: int
+    mission_mode: int
+
+
+class RcChannels(NamedTuple):
+    """RC_CHANNELS, id 65; all fields in wire order, arrays as raw bytes."""
+
+    time_boot_ms: int
+    chan1_raw: int
+    chan2_raw: int
+    chan3_raw: int
+    chan4_raw: int
+    chan5_raw: int
+    chan6_raw: int
+    chan7_raw: int
+    chan8_raw: int
+    chan9_raw: int
+    chan10_raw: int
+    chan11_raw: int
+    chan12_raw: int
+    chan13_raw: int
+    chan14_raw: int
+    chan15_raw: int
+    chan16_raw: int
+    chan17_raw: int
+    chan18_raw: int
+    chancount: int
+    rssi: int
+
+
 class EkfStatusReport(NamedTuple):
     """EKF_STATUS_REPORT, id 193; all fields in wire order, arrays as raw bytes."""
 
@@ -225,6 +262,8 @@ MESSAGES: Final[dict[int, Definition]] = definitions.MESSAGES | {
     36: Definition(36, "SERVO_OUTPUT_RAW", 37, Struct("<IHHHHHHHHBHHHHHHHH"), ServoOutputRaw),
     74: Definition(74, "VFR_HUD", 20, Struct("<ffffhH"), VfrHud),
     148: Definition(148, "AUTOPILOT_VERSION", 78, Struct("<QQIIIIHH8s8s8s18s"), AutopilotVersion),
+    42: Definition(42, "MISSION_CURRENT", 6, Struct("<HHBB"), MissionCurrent),
+    65: Definition(65, "RC_CHANNELS", 42, Struct("<IHHHHHHHHHHHHHHHHHHBB"), RcChannels),
     193: Definition(193, "EKF_STATUS_REPORT", 26, Struct("<fffffHf"), EkfStatusReport),
 }
 TEXTS: Final = frozenset({"mode_name", "name", "param_id", "text"})

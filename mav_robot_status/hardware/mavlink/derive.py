@@ -63,7 +63,7 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
         system=ids[0],
         component=ids[1],
         errors=tuple(error.cause for error in errors),
-        inhibits=() if possible is TRUE else inhibits(facts, options, mode, stopped, before, now),
+        inhibits=() if possible is TRUE else inhibits(facts, options, mode, (stopped, why_stopped), before, now),
         vehicle=_vehicle(facts)._replace(
             flight_mode=mode.name,
             custom_mode=facts.heartbeat.custom_mode,

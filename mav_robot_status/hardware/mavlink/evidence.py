@@ -100,12 +100,26 @@ def _switches(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     return "PARAM_VALUE: RCn_OPTION", None
 
 
+def _rc_channels(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    return "RC_CHANNELS, PARAM_VALUE: RCn_OPTION", state.stop_switch_at
+
+
 def _prearm_check(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     return "SYS_STATUS: PREARM_CHECK", state.stop.ready_at
 
 
 def _stop(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     return state.stop.source, state.stop.last
+
+
+def _applet(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    word = state.applet
+    return (None, None) if word is None else (f"NAMED_VALUE_FLOAT RS_STOP {word.value}", word.at)
+
+
+def _applet_and_outputs(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    (word, _), (values, at) = _applet(state, facts, reason), _outputs(state, facts, reason)
+    return f"{word}; {values}", at
 
 
 def _latch(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
@@ -162,6 +176,9 @@ SHOW: Final[dict[Source, Show]] = {
     Source.VERSION: _version,
     Source.SWITCHES: _switches,
     Source.STOP: _stop,
+    Source.APPLET: _applet,
+    Source.APPLET_AND_OUTPUTS: _applet_and_outputs,
+    Source.RC_CHANNELS: _rc_channels,
     Source.LATCH: _latch,
     Source.ESC: _esc,
     Source.OUTPUTS: _outputs,

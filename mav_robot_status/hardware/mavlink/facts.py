@@ -75,6 +75,19 @@ class Stop(NamedTuple):
     text: str | None
     is_ready: bool
     """Whether the pre-arm checks, which fail while it is engaged, pass."""
+    doubt: str | None
+    """Why a stop may last, although no evidence of it counts any more."""
+
+
+class Applet(NamedTuple):
+    """The word of the applet on the autopilot."""
+
+    stopped: TriState
+    """UNKNOWN: it is not heard, or says nothing about this vehicle."""
+    is_contradicted: bool
+    """Whether a motor is driven although it reports a stop."""
+    is_heard: bool
+    """Whether it is heard at all."""
 
 
 class SystemStatus(NamedTuple):
@@ -82,6 +95,8 @@ class SystemStatus(NamedTuple):
 
     safety_switch: bool
     """Whether it shows that the safety switch holds the outputs."""
+    switch_outdated: bool
+    """Whether the vehicle is armed, and the safety switch that it shows may have been released since."""
     ready: TriState
     """Whether the pre-arm checks pass. UNKNOWN: not reported."""
     internal_errors_since: int | None
@@ -147,6 +162,9 @@ class Facts(NamedTuple):
     esc_turning: bool
     """Whether ESC telemetry shows a motor that turns."""
     stop: Stop
+    applet: Applet
+    stop_switch: bool
+    """Whether an RC switch that stops the motors is in its stop position."""
     stop_excused: bool
     """Whether a switch exists whose stop the pre-arm checks ignore."""
     assumed_free: bool

@@ -16,7 +16,7 @@ from .derive import derive
 from .evidence import EvidenceOfVehicle
 from .handlers import overheard, pass_time
 from .identity import is_autopilot, named
-from .message_table import COMMAND_IDS, HEARTBEAT_ID, KINDS
+from .message_table import APPLET_ID, COMMAND_IDS, HEARTBEAT_ID, KINDS
 from .moment import Moment
 from .newcomers import Newcomers
 from .options import HardwareOptions
@@ -24,6 +24,7 @@ from .requests.scheduler import Ask, RequestScheduler
 from .rules.inhibits import inhibit
 from .settle import facts_of
 from .state import latches, motion
+from .state.applet import is_word
 from .state.latest_messages import SILENCE
 from .state.vehicle_state import begin
 from .vehicle import ExpectedVehicle, TrackedVehicle
@@ -77,6 +78,8 @@ class MavlinkRobotHW(RobotHW):
         """Whether the handles of vehicles that sent nothing still lack their inhibit LINK_STALE."""
         self.ignored = 0
         """Heartbeats of autopilots that no entry of the configuration names, or beyond MOST_VEHICLES."""
+        self.ignored_words = 0
+        """Words of the applet (RS_STOP) from a sender that is no vehicle."""
         for slot in slots:
             self.handles.register_handle(next(t.handle for t in self._expected if t.slot is slot))
 
@@ -107,6 +110,8 @@ class MavlinkRobotHW(RobotHW):
         if message_id == HEARTBEAT_ID:
             tracked = sender = self._vehicle_of(tracked, message, ids, now)
         if tracked is None:
+            if message_id == APPLET_ID and is_word(message):
+                self.ignored_words += 1
             return None
         state = tracked.state
         if state is None:
@@ -245,7 +250,10 @@ class MavlinkRobotHW(RobotHW):
         for (system, component), tracked in self._tracked.items():
             addressed = message.target_system == system and message.target_component in (0, component)
             if addressed and tracked.state is not None:
+                before = tracked.state.stop
                 overheard(tracked.state, message, sender, now)
+                if tracked.state.stop is not before and not tracked.dirty:
+                    self._mark_dirty(tracked)
 
     def _vehicle_of(
         self, tracked: TrackedVehicle | None, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant
@@ -374,6 +382,7 @@ class MavlinkRobotHW(RobotHW):
         facts = facts_of(state, moment, self.options)
         state.latest.unsettled = self._short_timeouts
         if facts != tracked.facts:
+            self._log_applet(tracked, facts)
             tracked.facts = facts
             self._renew(tracked, state, facts, now)
         tracked.dirty = False
@@ -408,6 +417,16 @@ class MavlinkRobotHW(RobotHW):
         tracked.established = tracked.established or _last_heard(tracked) - since >= ESTABLISHED
         if self._open and not tracked.established:
             self._expire_at = min(self._expire_at, _last_heard(tracked) + self.options.heartbeat_timeout + GONE)
+
+    def _log_applet(self, tracked: TrackedVehicle, facts: Facts) -> None:
+        was_heard = tracked.facts.applet.is_heard if tracked.facts else False
+        if facts.applet.is_heard is was_heard or not facts.fresh.heartbeat:
+            return
+        ids = tracked.ids or (0, 0)
+        if was_heard:
+            log.warning("vehicle %d.%d: the applet is silent, e_stopped is deduced again", *ids)
+        else:
+            log.info("vehicle %d.%d: the applet reports the emergency stop", *ids)
 
     def _log_link(self, tracked: TrackedVehicle, state: LinkState) -> None:
         before = tracked.handle.detail.link

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     """Indices in `Facts`, each with the function that settles the fact."""
 
 HEARTBEAT_ID: Final = mavlink.MAVLINK_MSG_ID_HEARTBEAT
+APPLET_ID: Final = mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT
 COMMAND_IDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_INT, mavlink.MAVLINK_MSG_ID_COMMAND_LONG})
 """Messages from other senders."""
 WANTED_IDS: Final = frozenset(d.id for d in mav.MESSAGES.values() if d.type in HANDLERS) | COMMAND_IDS
@@ -36,8 +37,11 @@ MOVES: Final[dict[type, tuple[str, ...]]] = {
     mav.Heartbeat: ("latched", "stop"),
     mav.MessageInterval: (),
     mav.LocalPositionNed: ("movement",),
+    mav.MissionCurrent: (),  # read with the next SYS_STATUS
+    mav.NamedValueFloat: ("stop", "applet"),
     mav.ParamValue: ("has_no_lift", "outputs", "outputs_vetoed", "stop_excused"),
-    mav.ServoOutputRaw: ("has_no_lift", "outputs", "outputs_vetoed"),
+    mav.RcChannels: ("stop_switch",),
+    mav.ServoOutputRaw: ("has_no_lift", "outputs", "outputs_vetoed", "applet"),
     mav.SysStatus: ("turns", "sys_status", "stop", "faults"),
     mav.SystemTime: (),
     mav.VfrHud: ("movement", "has_no_lift", "outputs_vetoed"),

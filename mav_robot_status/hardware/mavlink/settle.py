@@ -13,6 +13,7 @@ from ...mavlink.enumerations import MAV_LANDED_STATE_UNDEFINED, MAV_STANDARD_MOD
 from .autopilots.modes import ModeHints
 from .autopilots.sensor_weights import SOFT
 from .facts import (
+    Applet,
     Cause,
     Explained,
     Facts,
@@ -26,12 +27,14 @@ from .facts import (
     SystemStatus,
 )
 from .identity import AIRCRAFT, IN_THE_AIR
+from .state import applet as applets
 from .state import estop, latches, outputs, sensors, text_assembly
 from .state.boot_clock import GRACE
 from .state.estimator import denied_until
 from .state.latest_messages import FRESH
 from .state.motion import SUSTAIN_OFF, SUSTAIN_ON
-from .state.speeds import driving_speed, speed_over_ground
+from .state.speeds import hud_speeds, speed_over_ground
+from .state.vehicle_state import honours_stop, vtol_state
 
 if TYPE_CHECKING:
     from ...mavlink.definitions import Heartbeat
@@ -52,8 +55,9 @@ LEAST_LIFT: Final = 10
 """VFR_HUD.throttle in percent below which no aircraft hovers."""
 
 NO_OUTPUTS: Final = Outputs(False, False, False, False)
-NOTHING_SAID: Final = Stop(UNKNOWN, None, False)
-NO_SYS_STATUS: Final = SystemStatus(False, UNKNOWN, None, False)
+NOTHING_SAID: Final = Stop(UNKNOWN, None, False, None)
+NO_APPLET: Final = Applet(UNKNOWN, False, False)
+NO_SYS_STATUS: Final = SystemStatus(False, False, UNKNOWN, None, False)
 NOTHING_LATCHED: Final = Latched((), False, False)
 NO_HINTS: Final = ModeHints()
 
@@ -157,7 +161,11 @@ def motor_outputs(state: VehicleState, moment: Moment, options: HardwareOptions)
     watch = state.watch
     if watch.at is None or not state.heartbeats.armed:
         return NO_OUTPUTS
-    held = watch.held_since is not None and moment.has_come(watch.held_since + outputs.HOLD)
+    held = (
+        watch.held_since is not None
+        and moment.has_come(watch.held_since + outputs.HOLD)
+        and outputs.proves_stop(state.family, state.vehicle_type, vtol_state(state))
+    )
     at_stop = state.latest.esc is not None and outputs.is_at_stop(watch, state.vehicle_type)
     return new(Outputs, (moment.is_within(watch.at + FRESH), watch.driven, held, at_stop))
 
@@ -167,8 +175,8 @@ def outputs_vetoed(state: VehicleState, moment: Moment, options: HardwareOptions
     watch = state.watch
     if watch.held_since is None:
         return False
-    speed = driving_speed(state.latest, state.family)
-    return outputs.is_vetoed(watch, state.family, state.vehicle_type, speed, state.turning)
+    speed, climb = hud_speeds(state.latest)
+    return outputs.is_vetoed(watch, state.family, state.vehicle_type, speed, climb, state.turning)
 
 
 def esc_turning(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
@@ -178,11 +186,31 @@ def esc_turning(state: VehicleState, moment: Moment, options: HardwareOptions) -
 
 def stop(state: VehicleState, moment: Moment, options: HardwareOptions) -> Stop:
     """What the autopilot has reported about an emergency stop."""
-    said = state.stop
-    if said is estop.NOTHING:
+    said, word, doubt = state.stop, state.applet, state.stop.doubt
+    if word is not None and applets.stops(word, honours_stop(state)) and not moment.is_within(word.at + applets.FRESH):
+        doubt = doubt or estop.APPLET_SILENT
+    elif said is estop.NOTHING:
         return NOTHING_SAID
     is_over = said.repeats and moment.has_come(said.last + estop.REPEATED)
-    return new(Stop, (UNKNOWN if is_over else said.said, said.text, said.ready >= estop.READY_MESSAGES))
+    value = UNKNOWN if is_over else said.said
+    return new(Stop, (value, said.text, said.ready >= estop.READY_MESSAGES, doubt))
+
+
+def applet(state: VehicleState, moment: Moment, options: HardwareOptions) -> Applet:
+    """The word of the applet on the autopilot."""
+    word = state.applet
+    if word is None or not moment.is_within(word.at + applets.FRESH):
+        return NO_APPLET
+    if not applets.stops(word, honours_stop(state)):
+        return new(Applet, (UNKNOWN if word.value else FALSE, False, True))
+    since, watched_at = word.driven_since, state.watch.at
+    driven = since is not None and watched_at is not None and moment.is_within(watched_at + FRESH)
+    return new(Applet, (TRUE, driven and moment.has_come((since or 0.0) + applets.CONTRADICTED), True))
+
+
+def stop_switch(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
+    """Whether an RC switch that stops the motors is in its stop position."""
+    return moment.is_within(state.stop_switch_at + FRESH)
 
 
 def stop_excused(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
@@ -200,11 +228,14 @@ def sys_status(state: VehicleState, moment: Moment, options: HardwareOptions) ->
     heard, lost, errors = state.latest.sys_status, state.rc_lost_since, state.internal_errors_since
     if heard is None:
         return NO_SYS_STATUS
-    message, profile = heard.message, state.profile
+    message, profile, heartbeats = heard.message, state.profile, state.heartbeats
+    switch = profile.sensors.has_safety_switch and sensors.safety_switch_on(message)
+    outdated = switch and heartbeats.armed and (message is state.armed_after or not moment.is_within(heard.at + FRESH))
     return new(
         SystemStatus,
         (
-            profile.sensors.has_safety_switch and sensors.safety_switch_on(message),
+            switch and not outdated,
+            outdated,
             sensors.readiness(message, profile),
             None if errors is None else errors.unix_us,
             lost is not None and abs(lost.mono - state.heartbeats.state_since.mono) <= TOGETHER,
@@ -278,6 +309,8 @@ SETTLE: Final[dict[str, Settle]] = {
     "outputs_vetoed": outputs_vetoed,
     "esc_turning": esc_turning,
     "stop": stop,
+    "applet": applet,
+    "stop_switch": stop_switch,
     "stop_excused": stop_excused,
     "assumed_free": assumed_free,
     "sys_status": sys_status,

@@ -28,6 +28,7 @@ from .profile import (
     Sensors,
     Speeds,
     States,
+    StopCheck,
     Stops,
     StopText,
     Texts,
@@ -184,8 +185,8 @@ TEXTS: Final = table(
         (r"Vibration compensation (ON|OFF)|EKF primary changed:|EKF\d? lane switch", IGNORE),
         # emergency stop
         (r".*Emergency Stopped", Effect.ESTOP),
-        (r"RC\d+: MotorEStop HIGH", Effect.ESTOP),
-        (r"RC\d+: MotorEStop LOW", Effect.RELEASE),
+        (r"(RC\d+: )?MotorEStop HIGH", Effect.ESTOP),  # 4.1 and 4.2 send it without the prefix
+        (r"(RC\d+: )?MotorEStop LOW", Effect.RELEASE),
         # arming checks: "PreArm: Internal errors" is a fault, all others are only reasons not to arm
         (r"PreArm: Internal errors 0x", CAUSE, (causes.INTERNAL_ERROR,)),
         (r"PreArm: |Arm: ", READINESS),
@@ -293,7 +294,12 @@ ARDUPILOT: Final = Autopilot(
         shown_from=None,
         # recorded: ArduSub 4.5.6 accepts the command and drives on; no recording of the other families
         honoured_by=frozenset({Family.COPTER, Family.PLANE, Family.ROVER}),
-        ready_means_free=True,
+        check=StopCheck(
+            # Copter, and what became common to all vehicles: ArduPilot pull request 23415
+            first=dict.fromkeys(Family, (4, 4)) | {Family.PLANE: (4, 1), Family.ROVER: (4, 0)},
+            prearm_check=(4, 1),  # recorded: Copter 4.0.5 lacks the bit, ArduSub 4.1.1 has it
+            mission_state=(4, 4),  # ArduPilot pull request 23230
+        ),
         outputs_show=True,
         # Copter, Sub and Blimp only disarm, and can be armed again at once
         command_terminates=frozenset({Family.PLANE, Family.ROVER}),

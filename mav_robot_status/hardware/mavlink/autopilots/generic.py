@@ -54,7 +54,7 @@ GENERIC: Final = Autopilot(
         shown_by=EmergencyStop.TERMINATION_ONLY,
         shown_from=None,
         honoured_by=None,
-        ready_means_free=False,
+        check=None,
         outputs_show=False,
         command_terminates=frozenset(),
     ),

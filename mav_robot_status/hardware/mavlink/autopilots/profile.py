@@ -133,6 +133,18 @@ class Sensors:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class StopCheck:
+    """The pre-arm check that fails while a stop is engaged. Firmware before these versions lacks what they name."""
+
+    first: Mapping[Family, Version]
+    """The check itself. A family without a row never has it."""
+    prearm_check: Version
+    """PREARM_CHECK in SYS_STATUS."""
+    mission_state: Version
+    """A mission_state in MISSION_CURRENT."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Stops:
     """Emergency stops and terminations."""
 
@@ -141,10 +153,10 @@ class Stops:
     """The first version whose state shows every stop; older ones only send texts. None: all versions do, or none."""
     honoured_by: frozenset[Family] | None
     """The families whose motors a stop by switch or MAV_CMD_DO_AUX_FUNCTION stops. None: no such stop is known."""
-    ready_means_free: bool
-    """Whether the pre-arm checks fail while a stop is engaged."""
+    check: StopCheck | None
+    """The pre-arm check of stops. None: there is none."""
     outputs_show: bool
-    """Whether SERVO_OUTPUT_RAW, SERVOn_FUNCTION and RCn_OPTION show stops as on ArduPilot."""
+    """Whether SERVO_OUTPUT_RAW, SERVOn_FUNCTION, RCn_OPTION and RS_STOP of the applet show stops as on ArduPilot."""
     command_terminates: frozenset[Family]
     """The families that an accepted MAV_CMD_DO_FLIGHTTERMINATION stops permanently, without a state that shows it."""
 

@@ -164,7 +164,7 @@ PX4: Final = Autopilot(
         shown_by=EmergencyStop.STATE,
         shown_from=(1, 12),  # PX4-Autopilot pull request 17709
         honoured_by=None,
-        ready_means_free=False,
+        check=None,
         outputs_show=False,
         command_terminates=frozenset(),
     ),

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ....interface.status import TriState
 from ....mavlink.definitions import CommandAck, CommandInt, CommandLong
 from ....mavlink.enumerations import MAV_CMD_DO_FLIGHTTERMINATION, MAV_RESULT_ACCEPTED
 from ..causes import TERMINATION_ANNOUNCED
 from ..state import estop, latches, pending_command
+from ..state.vehicle_state import honours_stop
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -16,28 +18,37 @@ if TYPE_CHECKING:
 
 
 def overheard(state: VehicleState, message: CommandLong | CommandInt, sender: tuple[int, int], now: Instant) -> None:
-    """A command of `sender` to this vehicle."""
-    asked = pending_command.asked(message, sender, now)
-    if asked is not None:
-        state.asked = asked
+    """A command of `sender` that was delivered to this vehicle.
+
+    Until it is acknowledged, a command that changes the stop leaves a doubt: its acknowledgement may get lost.
+    """
+    asked = pending_command.asked(message, sender, state.stop, now)
+    if asked is None:
+        return
+    engages = asked.engages if honours_stop(state) else None
+    if engages is not None and state.stop.said is not (TriState.TRUE if engages else TriState.FALSE):
+        state.stop = estop.doubted(state.stop, estop.UNANSWERED, now.mono)
+        asked = asked._replace(after=state.stop)
+    state.asked = pending_command.remembered(state.asked, asked)
 
 
 def command_ack(state: VehicleState, message: CommandAck, now: Instant, options: HardwareOptions) -> None:
     """COMMAND_ACK: apply the command if the vehicle accepted it."""
-    asked = state.asked
-    if asked is None or not pending_command.is_answered(asked, message, now):
+    if not state.asked:
         return
-    state.asked = None
+    asked, state.asked = pending_command.answered(state.asked, message, now)
+    if asked is None:
+        return
     if message.result != MAV_RESULT_ACCEPTED:
+        if state.stop is asked.after:
+            state.stop = asked.before
         return
-    stops = state.profile.stops
     source = f"COMMAND_ACK: accepted command {asked.command} of {asked.sender[0]}.{asked.sender[1]}"
     if asked.command == MAV_CMD_DO_FLIGHTTERMINATION:
-        if asked.param1 >= 0.5 and state.family in stops.command_terminates:
+        if asked.param1 >= 0.5 and state.family in state.profile.stops.command_terminates:
             state.latches = latches.announce(state.latches, TERMINATION_ANNOUNCED, None, now, source)
         return
-    honoured = stops.honoured_by is not None and state.family in stops.honoured_by
-    known = honoured and asked.param1 == pending_command.MOTOR_ESTOP
-    if known and asked.param2 in (pending_command.LOW, pending_command.HIGH):
-        state.stop = estop.said(state.stop, asked.param2 == pending_command.HIGH, None, now, source)
+    engages = asked.engages
+    if engages is not None and honours_stop(state):
+        state.stop = estop.said(state.stop, engages, None, now, source)
         state.assumed_free = False

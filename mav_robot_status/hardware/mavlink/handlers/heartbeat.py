@@ -20,6 +20,7 @@ from ..state.heartbeat_history import armed_before, next_heartbeat
 from ..state.latest_messages import LatestMessages, heard
 from ..state.motion import Motion
 from ..state.vehicle_state import VehicleState, begin
+from .outputs import look_again
 from .statustext import pass_time
 
 if TYPE_CHECKING:
@@ -60,11 +61,14 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         if _is_another_run(state, started):
             rebooted(state, boot_rules.BootClock(started), now)
     if now.mono - last > LONG_LOSS:
-        state.latches, state.stop = latches.NO_LATCHES, estop.NOTHING
+        state.latches = latches.NO_LATCHES
         state.failsafe_cleared = None
         state.not_ready = state.failsafe = None
     if not connected:
         state.motion, state.gps_motion, state.rotation = Motion(), Motion(), Motion()
+        state.stop = estop.unsure(state.stop, estop.LINK_LOST, now.mono)
+    if heartbeats.armed and not (before.armed and connected):
+        state.armed_after = seen.sys_status.message if seen.sys_status is not None else None
     if not connected or (before.armed and not heartbeats.armed):
         state.stop = state.stop._replace(ready=0)
         state.assumed_free = False
@@ -72,6 +76,7 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         _armed(state, last, now)
     if state.profile.stops.shown_by is EmergencyStop.STATE and message.system_status == MAV_STATE_FLIGHT_TERMINATION:
         state.stop = estop.NOTHING  # it shows its stops, and need not be believed on its word
+    look_again(state, now.mono)
     if heartbeats.calm_since == now.mono:
         state.failsafe = None
         state.latches = latches.calmed(state.latches, before.state_since.mono)
@@ -159,10 +164,20 @@ def _armed(state: VehicleState, previous_beat: float, now: Instant) -> None:
     stop = state.stop
     checked = stop.ready >= estop.READY_MESSAGES and not estop.is_excused(state.switches)
     free = checked or estop.still_said(stop, now.mono) is TriState.FALSE
-    new = stop.said is TriState.TRUE and stop.last > previous_beat and not stop.repeats
-    state.stop = stop._replace(ready=0) if new else estop.NOTHING
+    new = (stop.said is TriState.TRUE or stop.doubt is not None) and stop.last > previous_beat and not stop.repeats
+    if new:
+        state.stop = stop._replace(ready=0)
+    else:
+        state.stop = estop.unsure(stop, estop.ARMED, now.mono) if _may_arm_stopped(state) else estop.NOTHING
     state.not_ready = None
     state.assumed_free = free and not new
+
+
+def _may_arm_stopped(state: VehicleState) -> bool:
+    """Whether this firmware may be armed while it is stopped, so that an arming is no evidence of a release."""
+    profile = state.profile
+    checked = estop.includes_stop(profile, state.family, state.version, state.reports_mission)
+    return profile.stops.check is not None and not checked
 
 
 def _outputs_enabled(state: VehicleState) -> bool:

@@ -9,36 +9,55 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ....interface.status import TriState
 from ....mavlink import definitions as mav
+from ..state import applet as applet_rules
 from ..state import estop, outputs
 from ..state.latest_messages import FRESH, heard, is_fresh
-from ..state.speeds import driving_speed
+from ..state.speeds import hud_speeds
+from ..state.vehicle_state import honours_stop, vtol_state
 
 if TYPE_CHECKING:
     from ....clock import Instant
     from ..options import HardwareOptions
     from ..state.vehicle_state import VehicleState
 
+STOP_POSITION: Final = 1800
+"""Pulse of an RC channel (us) from which ArduPilot takes its switch as high."""
+
+NO_PULSE: Final = 0xFFFF
+COASTING: Final = 3.0
+"""Seconds after the report of a stop in which a vehicle may still move, and its motors turn."""
+
 _NUMBERED: Final = re.compile(rb"SERVO(\d{1,2})_FUNCTION|RC(\d{1,2})_OPTION")
 
 
 def servo_output_raw(state: VehicleState, message: mav.ServoOutputRaw, now: Instant, options: HardwareOptions) -> None:
-    """SERVO_OUTPUT_RAW: the output watch of ArduPilot."""
+    """SERVO_OUTPUT_RAW: the output watch of ArduPilot. A driven motor ends every evidence of a stop."""
     if not state.profile.stops.outputs_show or not options.watch_outputs or message.port != 0:
         return
-    values = message[:8] + message[9:]
-    hud = state.latest.vfr_hud
-    throttle = hud.message.throttle if hud is not None and is_fresh(hud, now.mono, FRESH) else None
+    hud, at, watch = state.latest.vfr_hud, now.mono, state.watch
+    family, vehicle_type = state.family, state.vehicle_type
     outputs.heard_outputs(
-        state.watch,
-        values,
-        state.vehicle_type,
+        watch,
+        message[:8] + message[9:],
+        vehicle_type,
         state.heartbeats,
-        throttle,
-        driving_speed(state.latest, state.family),
-        now.mono,
+        hud.message.throttle if hud is not None and is_fresh(hud, at, FRESH) else None,
+        hud_speeds(state.latest)[0],
+        at,
+        outputs.hovers(family, vehicle_type, vtol_state(state)),
     )
-    if state.watch.driven and state.stop.said is TriState.TRUE:
-        state.stop = estop.NOTHING  # a driven motor is not stopped, whatever was reported before
+    if state.applet is not None:
+        state.applet = applet_rules.driven(state.applet, watch.driven, at)
+    before = state.stop
+    if watch.driven:
+        state.stop = estop.ended(before)
+    elif before.said is not TriState.TRUE:
+        held, off = watch.held_since, watch.off_since
+        if held is not None and at >= held + outputs.HOLD and outputs.may_be_held(family, vehicle_type):
+            state.stop = estop.doubted(before, estop.HELD, at)
+        elif off is not None and at >= off + outputs.SWITCHED_OFF:
+            state.stop = estop.doubted(before, estop.SHUT_DOWN, at)
+    if state.stop is not before:
         state.latest.unsettled = True
 
 
@@ -54,6 +73,69 @@ def param_value(state: VehicleState, message: mav.ParamValue, now: Instant, opti
         state.watch.name({**state.watch.functions, channel: int(value)})
     else:
         state.switches = {**state.switches, channel: int(value)}
+
+
+def rc_channels(state: VehicleState, message: mav.RcChannels, now: Instant, options: HardwareOptions) -> None:
+    """RC_CHANNELS: whether a switch of option 31 is in its stop position."""
+    if not state.switches:
+        return
+    for channel, option in state.switches.items():
+        if option == estop.MOTOR_ESTOP and channel <= len(message) and STOP_POSITION <= message[channel - 1] < NO_PULSE:
+            state.stop_switch_at = now.mono
+            return
+    state.stop_switch_at = -math.inf
+
+
+def named_value_float(
+    state: VehicleState, message: mav.NamedValueFloat, now: Instant, options: HardwareOptions
+) -> None:
+    """NAMED_VALUE_FLOAT: the word of the applet. A value without a meaning is ignored and counted."""
+    if not applet_rules.is_word(message) or not state.profile.stops.outputs_show:
+        return
+    value = applet_rules.value_of(message)
+    if value is None:
+        state.applet_ignored += 1
+        return
+    state.applet = applet_rules.heard(state.applet, value, now.mono)
+    if not value:
+        state.stop = estop.ended(state.stop)
+
+
+def mission_current(state: VehicleState, message: mav.MissionCurrent, now: Instant, options: HardwareOptions) -> None:
+    """MISSION_CURRENT: older firmware sends it without a mission_state."""
+    if message.mission_state:
+        state.reports_mission = True
+
+
+def look_again(state: VehicleState, now: float) -> None:
+    """At each heartbeat: end what was said, if the vehicle has power or shows its stops; note a silent applet."""
+    stop, word, shown_from = state.stop, state.applet, state.profile.stops.shown_from
+    if word is not None and not applet_rules.is_fresh(word, now):
+        state.applet = None
+        if applet_rules.stops(word, honours_stop(state)):
+            stop = estop.doubted(stop, estop.APPLET_SILENT, now)
+    if stop.said is TriState.TRUE and state.heartbeats.armed and _has_power(state, now):
+        stop = estop.doubted(stop, estop.UNDER_POWER, now)
+    if shown_from is not None and state.version is not None and state.version >= shown_from:
+        stop = estop.NOTHING  # it shows its stops, and need not be believed on its word
+    state.stop = stop
+
+
+def _has_power(state: VehicleState, now: float) -> bool:
+    """Whether there are signs of power, some time after a stop was reported: a stopped vehicle coasts first."""
+    latest, watch, since = state.latest, state.watch, state.stop.last
+    if now < since + COASTING:
+        return False
+    if watch.at is not None and now <= watch.at + FRESH:
+        if outputs.is_at_stop(watch, state.vehicle_type):
+            return False
+        if outputs.may_drive(watch, state.family, state.vehicle_type):
+            return True
+    if is_fresh(latest.esc, now, FRESH):
+        return True
+    fast, hud = state.motion.fast_since, latest.vfr_hud
+    moves = fast is not None and now >= max(fast, since) + COASTING
+    return moves and hud is not None and is_fresh(hud, now, FRESH) and hud.message.throttle >= outputs.DEMAND
 
 
 def esc_telemetry(state: VehicleState, message: Any, now: Instant, options: HardwareOptions) -> None:

@@ -13,7 +13,7 @@ from ..autopilots.profile import StopText
 from ..autopilots.texts import UNCLASSIFIED, Effect, When, classify
 from ..state import estop, latches, text_assembly
 from ..state.latest_messages import is_fresh
-from ..state.vehicle_state import Statement, ToldFirmware
+from ..state.vehicle_state import Statement, ToldFirmware, honours_stop
 from . import failsafe
 
 if TYPE_CHECKING:
@@ -73,8 +73,7 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
     elif effect is Effect.CLEAR:
         failsafe.cleared(state, words, rule.codes, now.mono)
     elif effect in (Effect.ESTOP, Effect.RELEASE):
-        honoured_by = state.profile.stops.honoured_by
-        if honoured_by is not None and state.heartbeats.armed and state.family not in honoured_by:
+        if state.profile.stops.outputs_show and state.heartbeats.armed and not honours_stop(state):
             return
         engaged = effect is Effect.ESTOP
         state.stop = estop.said(state.stop, engaged, words, now)

@@ -34,7 +34,8 @@ def sys_status(state: VehicleState, message: SysStatus, now: Instant, options: H
     seen.sys_status = heard(seen, message, now.mono, seen.sys_status)
     if state.latches:
         failsafe.radio_heard(state, now.mono)
-    state.stop = estop.heard_sys_status(state.stop, message, state.heartbeats, profile, now.mono)
+    checked = estop.includes_stop(profile, state.family, state.version, state.reports_mission)
+    state.stop = estop.heard_sys_status(state.stop, message, state.heartbeats, profile, checked, now.mono)
     state.faults = sensors.heard_faults(state.faults, sensors.faulty_mask(message, profile), now)
     if state.not_ready is not None and sensors.readiness(message, profile) is TriState.TRUE:
         state.not_ready, state.denied_at = None, -math.inf

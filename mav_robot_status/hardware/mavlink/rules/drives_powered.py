@@ -36,6 +36,8 @@ def drives_powered(facts: Facts, options: HardwareOptions, stopped: TriState, wh
         return FALSE, why_stopped._replace(rule=f"e_stopped: {why_stopped.rule}")
     if facts.heartbeat.system_status == MAV_STATE_FLIGHT_TERMINATION:
         return FALSE, Reason("state FLIGHT_TERMINATION", Source.STATE)
+    if why_stopped.doubt:
+        return UNKNOWN, why_stopped._replace(rule=f"e_stopped: {why_stopped.rule}")
     return TRUE, Reason("armed", Source.BASE_MODE)
 
 
@@ -52,6 +54,8 @@ def motion_possible(
         return FALSE, Reason("mode INITIALIZING", Source.CUSTOM_MODE)
     if options.manual_blocks_motion and mode.mode is RobotMode.MANUAL:
         return FALSE, Reason("manual mode (manual_blocks_motion)", Source.CUSTOM_MODE)
+    if drives is UNKNOWN:
+        return UNKNOWN, why_drives
     if state == MAV_STATE_UNINIT:
         return UNKNOWN, Reason("state UNINIT", Source.STATE)
     return TRUE, Reason("armed, not stopped, in a state that moves", Source.STATE)

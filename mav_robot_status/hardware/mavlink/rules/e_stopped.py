@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from ....mavlink.enumerations import MAV_STATE_FLIGHT_TERMINATION, MAV_TYPE_HELICOPTER
+from ....mavlink.enumerations import MAV_STATE_FLIGHT_TERMINATION
 from ..autopilots.profile import EmergencyStop
 from ..causes import TERMINATION_ANNOUNCED
-from ..identity import PLANE, Family
+from ..identity import PLANE
 from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 from .simulation import is_simulated
 
 if TYPE_CHECKING:
+    from ....interface.status import TriState
     from ..facts import Facts
     from ..options import HardwareOptions
 
-HELD_FAMILIES: Final = frozenset({Family.COPTER, Family.ROVER})
-"""The families whose outputs at their stop value prove a stop."""
-
 ASSUMED: Final = Reason("not stopped when armed, and no text since (estop_assume_visible)")
+APPLET: Final = Reason("the applet on the autopilot says so", Source.APPLET)
 SAID: Final = Reason("the autopilot said so", Source.STOP)
 NOT_WATCHED: Final = Reason("the outputs are not watched")
 
@@ -27,7 +26,7 @@ NOT_WATCHED: Final = Reason("the outputs are not watched")
 def e_stopped(facts: Facts, options: HardwareOptions) -> Finding:
     """Whether an emergency stop is engaged."""
     found = RULES[facts.kind.profile.stops.shown_by](facts, options)
-    if found[0] is UNKNOWN and options.estop_unknown_as == "false":
+    if found[0] is UNKNOWN and not found[1].doubt and options.estop_unknown_as == "false":
         return FALSE, Reason("estop_unknown_as: false")
     return found
 
@@ -39,9 +38,16 @@ def _by_state(facts: Facts, options: HardwareOptions) -> Finding:
             return UNKNOWN, Reason("in hardware-in-the-loop older PX4 is always in lockdown", Source.STATE)
         return TRUE, Reason("state FLIGHT_TERMINATION: kill, lockdown or termination", Source.STATE)
     said, version, shown_from = facts.stop.said, facts.kind.firmware, facts.kind.profile.stops.shown_from
+    shows_all = version is not None and shown_from is not None and version >= shown_from
     if said is TRUE:
+        if shows_all:
+            return UNKNOWN, Reason(
+                "a text reports a stop, and no heartbeat has shown the state since", Source.STOP, doubt=True
+            )
         return TRUE, SAID
-    if version is None or shown_from is None or version >= shown_from:
+    if facts.stop.doubt is not None and not shows_all:
+        return UNKNOWN, _doubt(facts.stop.doubt)
+    if version is None or shows_all:
         return FALSE, Reason("PX4 shows every stop as state FLIGHT_TERMINATION", Source.STATE)
     if said is FALSE:
         return FALSE, SAID
@@ -52,24 +58,54 @@ def _by_state(facts: Facts, options: HardwareOptions) -> Finding:
 
 def _deduced(facts: Facts, options: HardwareOptions) -> Finding:
     """ArduPilot: a stop changes neither HEARTBEAT nor, while armed, SYS_STATUS. Without evidence: UNKNOWN."""
-    said = facts.stop.said
-    if facts.fresh.sys_status and facts.sys_status.safety_switch:
-        return TRUE, Reason("safety switch engaged", Source.SAFETY_SWITCH)
-    if said is TRUE:
-        return TRUE, SAID
     if _is_terminated(facts):
         return TRUE, Reason("termination announced", Source.LATCH, TERMINATION_ANNOUNCED)
     if facts.heartbeat.system_status == MAV_STATE_FLIGHT_TERMINATION:
         return TRUE, Reason("state FLIGHT_TERMINATION", Source.STATE)
+    applet = facts.applet
+    if applet.stopped is not UNKNOWN:
+        if applet.is_contradicted:
+            rule = "the applet on the autopilot reports a stop, but a motor output is off its stop value"
+            return UNKNOWN, Reason(rule, Source.APPLET_AND_OUTPUTS, doubt=True)
+        return applet.stopped, APPLET
+    if facts.fresh.sys_status and facts.sys_status.safety_switch:
+        return TRUE, Reason("safety switch engaged", Source.SAFETY_SWITCH)
+    if facts.stop.said is TRUE:
+        return TRUE, SAID
     watched, why = _watched(facts, options)
     if watched is TRUE:
         return TRUE, why
+    doubt = _doubted(facts)
+    if doubt is not None:
+        return UNKNOWN, doubt
+    found = _released(facts, options, watched, why)
+    if facts.stop_switch and found[0] is FALSE:
+        # reversed channels and MAV_CMD_DO_AUX_FUNCTION can differ from the switch, so it is no evidence of a stop
+        rule = "a switch of option 31 is in its stop position"
+        return UNKNOWN, Reason(rule, Source.RC_CHANNELS, doubt=watched is not FALSE)
+    return found
+
+
+def _doubted(facts: Facts) -> Reason | None:
+    """Why a stop may last, although there is no evidence of it any more."""
+    if facts.sys_status.switch_outdated:
+        rule = "the safety switch was engaged, and may have been released since"
+        return Reason(rule, Source.SAFETY_SWITCH, doubt=True)
+    return None if facts.stop.doubt is None else _doubt(facts.stop.doubt)
+
+
+def _doubt(rule: str) -> Reason:
+    return Reason(rule, Source.STOP, doubt=True)
+
+
+def _released(facts: Facts, options: HardwareOptions, watched: TriState, why: Reason) -> Finding:
+    """FALSE if there is evidence that no stop is engaged. `watched` with its reason is that of the outputs."""
     if not facts.armed and facts.fresh.sys_status and facts.stop.is_ready:
         if facts.stop_excused:
             excused = "the pre-arm checks pass, but excuse a stop by the switch of option 165"
             return UNKNOWN, Reason(excused, Source.SWITCHES)
         return FALSE, Reason("the pre-arm checks, which include the stop, pass", Source.PREARM_CHECK)
-    if said is FALSE:
+    if facts.stop.said is FALSE:
         return FALSE, SAID
     if watched is FALSE:
         return FALSE, why
@@ -118,11 +154,6 @@ def _watched(facts: Facts, options: HardwareOptions) -> Finding:
         return UNKNOWN, Reason("no fresh SERVO_OUTPUT_RAW")
     if outputs.driven:
         return FALSE, Reason("a motor output is off its stop value", Source.OUTPUTS)
-    if outputs.held and not facts.outputs_vetoed and proves_stop(facts.kind.family, facts.kind.vehicle_type):
+    if outputs.held and not facts.outputs_vetoed:
         return TRUE, Reason("motor outputs held at their stop value while throttle is demanded", Source.OUTPUTS)
     return UNKNOWN, Reason("the outputs neither drive nor are held", Source.OUTPUTS)
-
-
-def proves_stop(family: Family, vehicle_type: int) -> bool:
-    """Whether held outputs prove a stop of this kind of vehicle."""
-    return family in HELD_FAMILIES and vehicle_type != MAV_TYPE_HELICOPTER

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from ....interface.status import Inhibit, RobotMode, TriState
+from ....interface.status import Inhibit, RobotMode
 from ....mavlink.enumerations import (
     MAV_STATE_BOOT,
     MAV_STATE_CALIBRATING,
@@ -25,22 +25,26 @@ if TYPE_CHECKING:
     from ..autopilots.modes import FlightMode
     from ..facts import Facts
     from ..options import HardwareOptions
+    from .reason import Finding
 
 INHIBITS: Final = (
     "LINK_STALE DISARMED E_STOPPED SAFETY_SWITCH PREARM_FAILING INITIALISING CALIBRATING POWERING_OFF TERMINATION "
-    "EMERGENCY HIL SYS_STATUS_MISSING MODE_MANUAL"
+    "EMERGENCY HIL SYS_STATUS_MISSING MODE_MANUAL STOP_UNCERTAIN"
 ).split()
 
 
 def inhibits(
-    facts: Facts, options: HardwareOptions, mode: FlightMode, stopped: TriState, before: Detail, now: Instant
+    facts: Facts, options: HardwareOptions, mode: FlightMode, stopped: Finding, before: Detail, now: Instant
 ) -> tuple[Inhibit, ...]:
-    """Every reason why motion is not possible."""
+    """Every reason why motion is not possible. `stopped` is e_stopped with its reason."""
+    value, why = stopped
     reasons: dict[str, str | None] = {}
     if not facts.armed:
         reasons["DISARMED"] = None
-    if stopped is TRUE:
+    if value is TRUE:
         reasons["E_STOPPED"] = facts.stop.text
+    elif why.doubt:
+        reasons["STOP_UNCERTAIN"] = facts.stop.text
     if _switch_is_on(facts):
         reasons["SAFETY_SWITCH"] = None
     if not facts.armed and _is_not_ready(facts):

@@ -28,6 +28,9 @@ class Source(Enum):
     VERSION = "the version of the firmware"
     SWITCHES = "RCn_OPTION"
     STOP = "what was said of an emergency stop"
+    APPLET = "RS_STOP"
+    APPLET_AND_OUTPUTS = "RS_STOP against SERVO_OUTPUT_RAW"
+    RC_CHANNELS = "RC_CHANNELS, with RCn_OPTION"
     LATCH = "what announced a cause"
     ESC = "ESC telemetry"
     OUTPUTS = "SERVO_OUTPUT_RAW"
@@ -45,6 +48,8 @@ class Reason(NamedTuple):
     source: Source = Source.NONE
     code: int = 0
     """The code of the cause, if the source is a cause."""
+    doubt: bool = False
+    """Of an unknown e_stopped: whether there is evidence of a stop, so that the drives may have no power."""
 
 
 Finding = tuple[TriState, Reason]

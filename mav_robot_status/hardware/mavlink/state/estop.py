@@ -1,8 +1,20 @@
-"""e_stopped: the evidence for an emergency stop, and against one, by autopilot.
+"""What was reported about an emergency stop, and when that ends.
+
+Evidence of a stop has a kind. What is measured counts more than what is shown, what is shown more than what is said:
+
+* said: a text, or a command with its acknowledgement. A text or command can get lost, and so can its opposite. What was
+  said ends with the opposite, with a link loss, with passing pre-arm checks that include the stop, with the next arming
+  and with a sign of power: a driven motor, or rpm or motion under throttle while the outputs do not show the stop.
+* shown: the state in the HEARTBEAT, the safety switch and PREARM_CHECK in SYS_STATUS, RS_STOP of the applet. It ends
+  when it is too old, and when the other word arrives.
+* measured: the motor outputs (`outputs`).
+
+Evidence of a stop that ends in another way than by evidence of a release leaves a doubt: the stop may last, so nothing
+says that the drives have power. A doubt ends with a release, a driven motor, passing checks, the applet or an arming.
 
 On ArduPilot an e-stop by RC switch or command changes neither HEARTBEAT nor, while armed, SYS_STATUS. Without other
-evidence an armed vehicle is UNKNOWN. PX4 shows every stop as state FLIGHT_TERMINATION; versions before 1.12
-only send texts. A vehicle with a known older version (AUTOPILOT_VERSION) and without such a text is UNKNOWN.
+evidence an armed vehicle is UNKNOWN. PX4 shows every stop as state FLIGHT_TERMINATION; versions before 1.12 only send
+texts.
 """
 
 from __future__ import annotations
@@ -18,8 +30,12 @@ if TYPE_CHECKING:
     from ....clock import Instant
     from ....mavlink.definitions import SysStatus
     from ..autopilots import Autopilot
+    from ..autopilots.firmware import Firmware
+    from ..identity import Family
     from .heartbeat_history import HeartbeatHistory
 
+MOTOR_ESTOP: Final = 31
+"""RCn_OPTION of a switch that stops in its high position. Also the auxiliary function of MAV_CMD_DO_AUX_FUNCTION."""
 ARM_EMERGENCY_STOP: Final = 165
 """RCn_OPTION of a switch that stops in its low position, where it is parked: the pre-arm checks ignore that stop."""
 SETTLING: Final = 2.0
@@ -46,8 +62,18 @@ class Stop(NamedTuple):
     ready: int = 0
     """Healthy SYS_STATUS in a row while disarmed."""
     ready_at: float = 0.0
+    doubt: str | None = None
+    """Why a stop may last: there was evidence of it, and none of its end. None: no such evidence."""
 
 
+LINK_LOST: Final = "a stop was reported, and the link was lost since"
+UNDER_POWER: Final = "a stop was reported, and since then there are signs of power"
+UNANSWERED: Final = "a command to stop or to release has no clear acknowledgement"
+HELD: Final = "the motor outputs were held by a stop, and no release was seen"
+SHUT_DOWN: Final = "the motors were switched off while armed, and have not been driven since"
+ARMED: Final = "a stop was reported before the arming, which this firmware may not refuse"
+APPLET_SILENT: Final = "the applet reported a stop, and is silent since"
+"""The doubts."""
 NOTHING: Final = Stop()
 
 
@@ -66,12 +92,47 @@ def said(stop: Stop, engaged: bool, text: str | None, now: Instant, source: str 
     )
 
 
+def doubted(stop: Stop, why: str, now: float) -> Stop:
+    """`stop` after evidence of a stop that has ended without evidence of a release. Also ends a reported release."""
+    if stop.doubt is not None:
+        return stop
+    return Stop(text=stop.text, source=stop.source, last=now, doubt=why)
+
+
+def ended(stop: Stop) -> Stop:
+    """`stop` after evidence that none is engaged: a driven motor, or the word of the applet."""
+    return NOTHING if stop.said is TriState.TRUE or stop.doubt is not None else stop
+
+
+def unsure(stop: Stop, why: str, now: float) -> Stop:
+    """`stop` when nothing that was said counts any more: of a stop a doubt is left."""
+    if stop.said is TriState.TRUE or stop.doubt is not None:
+        return doubted(stop, why, now)
+    return NOTHING
+
+
+def includes_stop(profile: Autopilot, family: Family, version: Firmware | None, reports_mission: bool) -> bool:
+    """Whether the pre-arm checks of this firmware fail while a stop is engaged.
+
+    Without a known `version` its least value follows from what the firmware sends: PREARM_CHECK in SYS_STATUS, or
+    MISSION_CURRENT with a mission_state.
+    """
+    check = profile.stops.check
+    if check is None or family not in check.first:
+        return False
+    least = check.mission_state if reports_mission else check.prearm_check
+    return (version or least) >= check.first[family]
+
+
 def heard_sys_status(
-    stop: Stop, status: SysStatus, heartbeats: HeartbeatHistory, profile: Autopilot, now: float
+    stop: Stop, status: SysStatus, heartbeats: HeartbeatHistory, profile: Autopilot, checked: bool, now: float
 ) -> Stop:
-    """`stop` after one more SYS_STATUS: two ready ones in a row, some time after the disarm, clear the texts."""
+    """`stop` after one more SYS_STATUS: two ready ones in a row, some time after the disarm, clear what was said.
+
+    `checked`: `includes_stop` of this vehicle.
+    """
     if (
-        not profile.stops.ready_means_free
+        not checked
         or heartbeats.armed
         or safety_switch_on(status)
         or readiness(status, profile) is not TriState.TRUE

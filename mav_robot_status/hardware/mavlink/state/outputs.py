@@ -3,7 +3,7 @@
 ArduPilot's motor e-stop forces the motor and throttle outputs to their stop value (`SRV_Channel::should_e_stop`) and
 changes neither HEARTBEAT nor SYS_STATUS while armed. The worst error is to report a live robot as stopped, so "held"
 needs proof: the same channels have left their stop value since the last arming, throttle is demanded, and no speed
-grows.
+grows. A motor that is switched off while armed, without such proof, is only a reason to doubt.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from ....mavlink import enumerations as mavlink
-from ..identity import ROVER, Family
+from ..identity import PLANE, ROVER, Family
 
 if TYPE_CHECKING:
     from .heartbeat_history import HeartbeatHistory
@@ -24,6 +24,12 @@ LEAST_PULSE: Final = 800  # us: a lower output is switched off, and proves nothi
 SEVERAL: Final = 3  # motors that all leave their stop value when armed: only a multirotor does that
 DEMAND: Final = 15  # %: VFR_HUD.throttle from which an output at stop is suspicious
 HOLD: Final = 1.0  # s
+SWITCHED_OFF: Final = 1.5  # s: longer than the heartbeat that shows a disarm may be late
+FOLLOWS: Final = 0.2  # relative: as much may the pulse per percent of throttle differ at two throttles
+LOW_THROTTLE, HIGH_THROTTLE = 60, 75  # %: the two throttles are on either side
+LEAST_SLOPE: Final = 5.0  # us per percent: no control surface is that far off at such a throttle
+FLYING: Final = 5.0  # m/s: a plane without power that is this fast sinks or slows down
+LOSS: Final = 0.5  # m/s: by as much at least
 BEATS_APART: Final = 3.5  # s: a stop value is learnt only between two disarmed heartbeats this close
 GROWTH: Final = 0.5  # m/s: such an increase of speed while held shows that the vehicle is driven
 STRAIGHT: Final = 0.15  # rad/s: a rover that turns faster may be driven by a channel that is not the assumed one
@@ -41,7 +47,14 @@ ASSUMED_CHANNELS: Final[Mapping[int, tuple[int, ...]]] = {
     mavlink.MAV_TYPE_GROUND_ROVER: (3,),
     mavlink.MAV_TYPE_SURFACE_BOAT: (3,),
     mavlink.MAV_TYPE_GROUND_QUADRUPED: (),
+    mavlink.MAV_TYPE_FIXED_WING: (3,),
+    mavlink.MAV_TYPE_SUBMARINE: (1, 2, 3, 4, 5, 6),
 }
+LIFT: Final = (5, 6, 7, 8)
+"""The default channels of the lift motors of a QuadPlane, whose type in the HEARTBEAT is that of a plane."""
+STOPS_NEAR: Final = {Family.ROVER: (1400, 1600), Family.SUB: (1400, 1600)}
+"""Where a stop value is that was not learnt, us: of motors that reverse. Of all others: near the low end."""
+LOW_END: Final = (LEAST_PULSE, 1250)
 
 Outputs = tuple[int, ...]
 
@@ -63,9 +76,13 @@ class Watch:
     """Whether a motor was driven since the last arming."""
     driven: bool = False
     """Whether the latest outputs drive a motor."""
+    off_since: float | None = None
+    """Since when all motors of a hovering vehicle are at their stop value, while armed and after they were driven."""
+    slope: float = 0.0
+    """Of an assumed throttle channel: us per percent of a high throttle. 0: none seen."""
     held_since: float | None = None
     speed_then: float = 0.0
-    """Speed over ground of a rover when the hold began, m/s."""
+    """Speed over ground of a rover or a plane when the hold began, m/s."""
     at: float | None = None
     """When the latest outputs arrived."""
     values: Outputs = ()
@@ -100,31 +117,80 @@ def heard_outputs(
     throttle: float | None,
     speed: float,
     now: float,
+    hovers: bool = False,
 ) -> None:
-    """Process a SERVO_OUTPUT_RAW; `throttle` in percent, None if it is not fresh."""
+    """Process a SERVO_OUTPUT_RAW; `throttle` in percent, None if it is not fresh.
+
+    `hovers`: motors that are switched off would let the vehicle fall, so the autopilot does not do that by itself.
+    """
     watch.at, watch.values = now, values
     if not heartbeats.armed:
-        watch.candidate, watch.driven, watch.held_since = values, False, None
+        watch.candidate, watch.driven, watch.held_since, watch.off_since = values, False, None, None
         return
     motors, assumed = channels(watch, vehicle_type)
-    stop = watch.stop
-    known = [abs(values[c - 1] - stop[c]) for c in motors if c in stop and c <= len(values)]  # distance from it, us
-    complete = len(known) == len(motors)
-    farthest = max(known) if known else 0
-    off_stop = farthest > OFF_STOP
-    at_stop = complete and bool(known) and farthest <= AT_STOP
+    known = _distances(watch, motors)
+    complete = len(known) == len(motors) > 0
+    off_stop = bool(known) and max(known) > OFF_STOP
+    at_stop = complete and max(known) <= AT_STOP
+    lifts = assumed and vehicle_type == mavlink.MAV_TYPE_FIXED_WING
+    lifting = False
+    if lifts:
+        lift = _distances(watch, LIFT)
+        lifting = len(lift) == len(LIFT) and min(lift) > OFF_STOP
+        pulses = sum(values[c - 1] >= LEAST_PULSE for c in LIFT)
+        at_stop = at_stop and len(lift) == pulses and max(lift, default=0) <= AT_STOP
+        hovers = hovers and pulses == len(LIFT)
     demanded = throttle is not None and throttle >= DEMAND
     if not watch.proved:
-        # one of several assumed channels may move a gimbal; the motors of a multirotor all leave their stop value
-        one_will_do = not (assumed and len(motors) >= SEVERAL)
-        all_off = complete and len(known) >= SEVERAL and min(known) > OFF_STOP
-        watch.proved = (off_stop and demanded and one_will_do) or all_off
+        watch.proved = _is_proof(watch, known, motors, assumed, vehicle_type, throttle if demanded else None)
     if not (at_stop and demanded and watch.proved and watch.driven_seen):
         watch.held_since = None
     elif watch.held_since is None:
         watch.held_since, watch.speed_then = now, speed
-    watch.driven = off_stop and (watch.proved or not assumed)
+    watch.driven = (off_stop and (watch.proved or not assumed)) or lifting
     watch.driven_seen = watch.driven_seen or watch.driven
+    if not (hovers and at_stop and watch.driven_seen):
+        watch.off_since = None
+    elif watch.off_since is None:
+        watch.off_since = now
+
+
+def _distances(watch: Watch, motors: tuple[int, ...]) -> list[int]:
+    """How far (us) the motors are from their known stop values, without those whose output is switched off."""
+    stop, values = watch.stop, watch.values
+    return [
+        abs(values[c - 1] - stop[c]) for c in motors if c in stop and c <= len(values) and values[c - 1] >= LEAST_PULSE
+    ]
+
+
+def _is_proof(
+    watch: Watch,
+    known: list[int],
+    motors: tuple[int, ...],
+    assumed: bool,
+    vehicle_type: int,
+    throttle: float | None,
+) -> bool:
+    """Whether the distances `known` prove that the channels are motors; `throttle` in percent, None if not demanded."""
+    off = sum(distance > OFF_STOP for distance in known)
+    if off >= SEVERAL and (vehicle_type == mavlink.MAV_TYPE_SUBMARINE or off == len(motors)):
+        return True
+    if throttle is None or not off:
+        return False
+    if assumed and vehicle_type == mavlink.MAV_TYPE_FIXED_WING:
+        return _follows(watch, known[0] / throttle, throttle)
+    # one of several assumed channels may move a gimbal
+    return not (assumed and len(motors) >= SEVERAL)
+
+
+def _follows(watch: Watch, slope: float, throttle: float) -> bool:
+    """Whether an output has the same `slope` (us per percent) at a high and at a low throttle.
+
+    Then it is the throttle of a plane. A control surface does not follow the throttle.
+    """
+    if throttle >= HIGH_THROTTLE:
+        watch.slope = slope
+    return throttle <= LOW_THROTTLE and slope >= LEAST_SLOPE and abs(slope - watch.slope) <= FOLLOWS * watch.slope
 
 
 def heartbeat_arrived(
@@ -138,14 +204,16 @@ def heartbeat_arrived(
     """Process a heartbeat: stop values are learnt while disarmed, each arming resets the proofs."""
     if heartbeats.armed:
         if before is not None and not before.armed:
-            watch.candidate, watch.held_since = (), None
+            watch.candidate, watch.held_since, watch.off_since = (), None, None
             watch.driven = watch.driven_seen = False
         return
     candidate, watch.candidate = watch.candidate, ()
     if before is None or before.armed or not candidate or not outputs_enabled:
         return
     if now - before.runs[-1].last <= BEATS_APART:
-        motors, _ = channels(watch, vehicle_type)
+        motors, assumed = channels(watch, vehicle_type)
+        if assumed and vehicle_type == mavlink.MAV_TYPE_FIXED_WING:
+            motors += LIFT
         learnt = {c: candidate[c - 1] for c in motors if c <= len(candidate)}
         watch.stop = {c: value for c, value in learnt.items() if value >= LEAST_PULSE}
 
@@ -153,17 +221,53 @@ def heartbeat_arrived(
 def is_at_stop(watch: Watch, vehicle_type: int) -> bool:
     """Whether every motor output is known to be at its stop value: then a turning motor is not driven."""
     motors, _ = channels(watch, vehicle_type)
-    known = [(watch.values[c - 1], watch.stop[c]) for c in motors if c in watch.stop and c <= len(watch.values)]
-    return len(known) == len(motors) > 0 and all(abs(value - stop) <= OFF_STOP for value, stop in known)
+    known = _distances(watch, motors)
+    return len(known) == len(motors) > 0 and max(known) <= OFF_STOP
 
 
-def is_vetoed(watch: Watch, family: Family, vehicle_type: int, speed: float, turning: float) -> bool:
-    """Whether `speed` (`driving_speed`) shows that the vehicle is driven although the outputs seem held.
+def may_drive(watch: Watch, family: Family, vehicle_type: int) -> bool:
+    """Whether a motor output is off its stop value, learnt or as it usually is. Not a proof."""
+    low, high = STOPS_NEAR.get(family, LOW_END)
+    for c in channels(watch, vehicle_type)[0]:
+        value = watch.values[c - 1] if c <= len(watch.values) else 0
+        if value < LEAST_PULSE:
+            continue
+        if abs(value - watch.stop[c]) > OFF_STOP if c in watch.stop else not low <= value <= high:
+            return True
+    return False
 
-    A stopped copter falls; a stopped rover coasts. `turning` in rad/s: one motor of a rover with a motor on each side
-    may stand still during a turn.
+
+def hovers(family: Family, vehicle_type: int, vtol_state: int) -> bool:
+    """Whether the vehicle would fall without motors: a multirotor, or a plane on its lift motors."""
+    if family is PLANE:
+        return vtol_state in (mavlink.MAV_VTOL_STATE_MC, mavlink.MAV_VTOL_STATE_TRANSITION_TO_MC)
+    return family is Family.COPTER and vehicle_type != mavlink.MAV_TYPE_HELICOPTER
+
+
+def proves_stop(family: Family, vehicle_type: int, vtol_state: int) -> bool:
+    """Whether held outputs prove a stop. On its lift motors a plane demands throttle while its propeller stands.
+
+    A sub demands throttle while it idles. The outputs of a helicopter or a blimp may move its swash plate or its fins.
     """
+    if family is PLANE:
+        return vtol_state == mavlink.MAV_VTOL_STATE_UNDEFINED
+    return family is ROVER or hovers(family, vehicle_type, vtol_state)
+
+
+def may_be_held(family: Family, vehicle_type: int) -> bool:
+    """Whether held outputs are evidence of a stop at all. See `proves_stop`."""
+    return family in (PLANE, ROVER, Family.COPTER) and vehicle_type != mavlink.MAV_TYPE_HELICOPTER
+
+
+def is_vetoed(watch: Watch, family: Family, vehicle_type: int, speed: float, climb: float, turning: float) -> bool:
+    """Whether the motion shows that the vehicle is driven although the outputs seem held.
+
+    A stopped copter falls, a stopped rover coasts, a stopped plane sinks or slows down. `speed` over ground and `climb`
+    in m/s. `turning` in rad/s: one motor of a rover with a motor on each side may stand still during a turn.
+    """
+    grown = speed - watch.speed_then
     if family is not ROVER:
-        return speed > GROWTH
+        keeps_flying = family is PLANE and speed > FLYING and climb > -LOSS and grown > -LOSS
+        return climb > GROWTH or keeps_flying
     assumed = channels(watch, vehicle_type)[1]
-    return (assumed and turning > STRAIGHT) or speed - watch.speed_then > GROWTH
+    return (assumed and turning > STRAIGHT) or grown > GROWTH

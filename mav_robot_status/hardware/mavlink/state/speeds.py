@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..identity import ROVER
-
 if TYPE_CHECKING:
-    from ..identity import Family
     from .latest_messages import LatestMessages
 
 
@@ -18,10 +15,10 @@ def speed_over_ground(latest: LatestMessages) -> float:
     return 0.0 if position is None else math.hypot(position.message.vx, position.message.vy) / 100
 
 
-def driving_speed(latest: LatestMessages, family: Family) -> float:
-    """The speed that grows if the motors really run: speed over ground of a rover, climb of a copter; m/s."""
+def hud_speeds(latest: LatestMessages) -> tuple[float, float]:
+    """The speed over ground and the climb in VFR_HUD, m/s; 0 until one arrives."""
     hud = latest.vfr_hud
     if hud is None:
-        return 0.0
-    speed: float = hud.message.groundspeed if family is ROVER else hud.message.climb
-    return speed if math.isfinite(speed) else 0.0
+        return 0.0, 0.0
+    speed, climb = hud.message.groundspeed, hud.message.climb
+    return speed if math.isfinite(speed) else 0.0, climb if math.isfinite(climb) else 0.0

@@ -12,22 +12,23 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from ....clock import Instant
+from ....mavlink.enumerations import MAV_VTOL_STATE_UNDEFINED
 from ..autopilots import announced_as
 from ..identity import Family, family_of, sensor_name
-from . import estop, latches, outputs, sensors, text_assembly
+from . import estop, latches, outputs, pending_command, sensors, text_assembly
 from .boot_clock import BootClock
 from .heartbeat_history import HeartbeatHistory, first_heartbeat
 from .latest_messages import LatestMessages, heard
 from .motion import Motion
-from .pending_command import PendingCommand
 
 if TYPE_CHECKING:
-    from ....mavlink.definitions import Heartbeat
+    from ....mavlink.definitions import Heartbeat, SysStatus
     from ..autopilots import Autopilot
     from ..autopilots.firmware import Firmware
     from ..autopilots.modes import AvailableMode
     from ..autopilots.sensor_weights import Weight
     from ..options import HardwareOptions
+    from .applet import Applet
 
 
 class Statement(NamedTuple):
@@ -92,8 +93,18 @@ class VehicleState:
     internal_errors_since: Instant | None = None
     rc_lost_since: Instant | None = None
     """When PX4's RC_RECEIVER bit turned unhealthy; without RC it is so for a whole flight."""
-    asked: PendingCommand | None = None
-    """A command of another component to this vehicle, without an acknowledgement yet."""
+    asked: pending_command.Pending = pending_command.NONE
+    """Commands of other components to this vehicle, without an acknowledgement yet."""
+    applet: Applet | None = None
+    """The latest word of the applet on the autopilot. None: it is not heard."""
+    applet_ignored: int = 0
+    """Words of the applet without a meaning."""
+    reports_mission: bool = False
+    """Whether MISSION_CURRENT has a mission_state."""
+    armed_after: SysStatus | None = None
+    """The latest SYS_STATUS before the arming, or before the connection to an armed vehicle."""
+    stop_switch_at: float = -math.inf
+    """When a switch of option 31 was last in its stop position, monotonic seconds."""
     assumed_free: bool = False
     """`estop_assume_visible`: no e-stop was engaged when it was armed."""
     event: int | None = None
@@ -114,9 +125,14 @@ class VehicleState:
         self.profile = self.shown or announced_as(self.autopilot)
         self.family = family_of(self.vehicle_type)
 
+    @property
+    def version(self) -> Firmware | None:
+        """The version of its firmware, if it was told."""
+        return None if self.firmware is None else self.firmware.firmware
+
     def counting_faults(self, options: HardwareOptions) -> list[tuple[int, Weight, sensors.Fault]]:
         """The faults in SYS_STATUS that have a meaning for this vehicle, at this site."""
-        firmware = self.firmware and self.firmware.firmware
+        firmware = self.version
         return [
             found
             for found in sensors.counting(self.faults, self.profile, firmware, self.heartbeats.armed)
@@ -149,3 +165,15 @@ def begin(heartbeat: Heartbeat, now: Instant) -> VehicleState:
         vehicle_type=heartbeat.type,
         autopilot=heartbeat.autopilot,
     )
+
+
+def honours_stop(state: VehicleState) -> bool:
+    """Whether a stop by switch or command stops the motors of this vehicle."""
+    honoured_by = state.profile.stops.honoured_by
+    return honoured_by is not None and state.family in honoured_by
+
+
+def vtol_state(state: VehicleState) -> int:
+    """MAV_VTOL_STATE of the latest EXTENDED_SYS_STATE; UNDEFINED until one arrives."""
+    seen = state.latest.extended_sys_state
+    return MAV_VTOL_STATE_UNDEFINED if seen is None else seen.message.vtol_state

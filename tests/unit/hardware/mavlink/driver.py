@@ -50,6 +50,11 @@ def statustext(text: str | bytes, severity: int, number: int = 0, chunk: int = 0
     return mav.Statustext(severity, raw, number, chunk)
 
 
+def version_of(major: int, minor: int, patch: int) -> mav.AutopilotVersion:
+    """AUTOPILOT_VERSION of a release."""
+    return mav.AutopilotVersion(major << 24 | minor << 16 | patch << 8 | 255)
+
+
 def check_invariants(status: RobotStatus, detail: Detail, options: HardwareOptions) -> None:
     """I1-I4; `link_loss_is_error` is the one exception to I4: the error is known, everything else is not."""
     if status.e_stopped is TriState.TRUE:
@@ -98,6 +103,7 @@ class Flight:
         options: HardwareOptions | None = None,
         slots: tuple[ExpectedVehicle, ...] = (),
         streams: bool = True,
+        version: tuple[int, int, int] | None = None,
     ) -> None:
         self.clock = ManualClock()
         self.hw = MavlinkRobotHW(options, slots)
@@ -115,6 +121,8 @@ class Flight:
         if streams:
             self.stream("heartbeat", self.heartbeat)
             self.stream("sys_status", self.sys_status)
+            if version is not None:
+                self.stream("version", lambda: version_of(*version), hz=0.1)
 
     # -- what it says -----------------------------------------------------------------------------------------------
 
@@ -260,7 +268,8 @@ class Flight:
 
 
 def copter(**how: Any) -> Flight:
-    return Flight(ARDUPILOT, QUAD, **how)
+    """A copter whose pre-arm checks include the stop."""
+    return Flight(ARDUPILOT, QUAD, **{"version": (4, 5, 6)} | how)
 
 
 def rover(**how: Any) -> Flight:

@@ -88,7 +88,7 @@ MESSAGES: Final[dict[type, Make]] = {
     mav.Event: lambda flight, dice: mav.Event(
         1, flight.boot_ms, dice.randrange(99), 0, 0, dice.choice((0x42, 0x62, 0x88)), b""
     ),
-    mav.ExtendedSysState: lambda _, dice: mav.ExtendedSysState(0, dice.randrange(5)),
+    mav.ExtendedSysState: lambda _, dice: mav.ExtendedSysState(dice.choice((0, 0, 3)), dice.randrange(5)),
     mav.GlobalPositionInt: lambda flight, dice: mav.GlobalPositionInt(
         flight.boot_ms, dice.choice((0, 1)), 0, round(100 * dice.choice(SPEEDS)), 0, 0
     ),
@@ -101,7 +101,7 @@ MESSAGES: Final[dict[type, Make]] = {
         (*[dice.choice((STOP_PWM, STOP_PWM, DRIVEN_PWM))] * 8, 0, *[0] * 8)
     ),
     mav.ParamValue: lambda _, dice: mav.ParamValue(
-        dice.choice((0.0, 33.0, 70.0, 165.0)), 0, 0, dice.choice(PARAMETERS), 2
+        dice.choice((0.0, 31.0, 33.0, 70.0, 165.0)), 0, 0, dice.choice(PARAMETERS), 2
     ),
     mav.EscTelemetry1To4: _rpm("H", lambda rpm: mav.EscTelemetry1To4(b"", b"", b"", rpm, b"", b"")),
     mav.EscTelemetry5To8: _rpm("H", lambda rpm: mav.EscTelemetry5To8(b"", b"", b"", rpm, b"", b"")),
@@ -109,6 +109,9 @@ MESSAGES: Final[dict[type, Make]] = {
     mav.EscStatus: _rpm("i", lambda rpm: mav.EscStatus(0, rpm, b"", b"", 0)),
     mav.CommandLong: lambda _, dice: _command(*dice.choice(COMMANDS)),
     mav.CommandAck: lambda _, dice: mav.CommandAck(dice.choice((185, 218)), dice.choice((0, 0, 4)), 0, 0, 0, 0),
+    mav.NamedValueFloat: lambda flight, dice: mav.NamedValueFloat(flight.boot_ms, dice.randrange(4), b"RS_STOP"),
+    mav.RcChannels: lambda _, dice: mav.RcChannels(*[dice.choice((1000, 1900))] * 18),
+    mav.MissionCurrent: lambda _, dice: mav.MissionCurrent(dice.randrange(3)),
     mav.CurrentMode: lambda flight, dice: mav.CurrentMode(flight.mode, flight.mode, dice.randrange(5)),
     mav.MessageInterval: lambda flight, dice: mav.MessageInterval(dice.randrange(-1, 10**6), dice.randrange(300)),
     mav.AvailableModes: lambda flight, dice: mav.AvailableModes(flight.mode, 0, 1, 1, dice.randrange(5), b"MODE"),

@@ -69,6 +69,7 @@ def test_the_bits_of_the_inhibits_are_those_of_the_specification() -> None:
         (10, "HIL"),
         (11, "SYS_STATUS_MISSING"),
         (12, "MODE_MANUAL"),
+        (13, "STOP_UNCERTAIN"),
     ]
 
 

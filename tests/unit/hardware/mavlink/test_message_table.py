@@ -21,7 +21,7 @@ from .random_flights import MESSAGES, fly
 from .settled import ROWS, Changes, Mark, Witness, ignore_table, marks, omissions, switch_off
 from .test_sequences import Outputs
 
-SEEDS: Final = range(4)
+SEEDS: Final = range(6)
 
 
 def held(flight: Flight, stop: list[int], driven: list[int]) -> Flight:
@@ -149,6 +149,49 @@ def a_sensor_is_faulty_at_boot_and_the_clock_is_heard_late() -> None:
     flight.send(flight.system_time())
 
 
+def word(flight: Flight, value: float) -> mav.NamedValueFloat:
+    return mav.NamedValueFloat(flight.boot_ms, value, b"RS_STOP")
+
+
+def the_applet_speaks_while_a_motor_is_driven_and_falls_silent() -> None:
+    flight = copter()
+    outputs = Outputs(flight, [1000] * 4)
+    flight.wait(15)
+    flight.hb(armed=True, state=ACTIVE)
+    outputs.set([1632] * 4, 39)
+    flight.stream("word", lambda: word(flight, 1), hz=4).wait(5)
+    outputs.set([1000] * 4, 0)
+    flight.wait(3)
+    flight.stop("word").wait(3.5)
+    flight.send(word(flight, 1)).wait(1)
+    flight.send(word(flight, 0))
+
+
+def a_switch_is_moved() -> None:
+    flight = copter().send(mav.ParamValue(31.0, 0, 0, b"RC7_OPTION", 2)).look()
+    for pulse in (1000, 1900, 1000):
+        flight.send(mav.RcChannels(*[pulse] * 18)).wait(0.5)
+
+
+def the_receiver_loses_its_fix_at_rest() -> None:
+    flight = px4()
+    flight.stream("gps", lambda: mav.GpsRawInt(0, 3), hz=4).wait(4)
+    flight.stop("gps").send(mav.GpsRawInt(0, 1))
+
+
+def a_copter_climbs_in_the_first_second_of_a_hold() -> None:
+    flight = copter()
+    outputs = Outputs(flight, [1000] * 4, climb=2.0)
+    flight.wait(15)
+    flight.hb(armed=True, state=ACTIVE)
+    outputs.set([1632] * 4, 39)
+    flight.wait(3)
+    outputs.set([1000] * 4, 39)
+    flight.wait(0.6)
+    outputs.set([1632] * 4, 39)
+    flight.wait(1)
+
+
 STORIES: Final[list[Callable[[], Any]]] = [
     a_rover_turns_while_its_outputs_are_held,
     *(
@@ -173,6 +216,10 @@ STORIES: Final[list[Callable[[], Any]]] = [
     the_checks_pass_after_a_stop_was_said,
     a_failsafe_is_said_between_two_heartbeats_of_the_same_time,
     a_sensor_is_faulty_at_boot_and_the_clock_is_heard_late,
+    the_applet_speaks_while_a_motor_is_driven_and_falls_silent,
+    a_switch_is_moved,
+    the_receiver_loses_its_fix_at_rest,
+    a_copter_climbs_in_the_first_second_of_a_hold,
     *(partial(fly, seed) for seed in SEEDS),
 ]
 

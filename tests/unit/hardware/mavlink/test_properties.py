@@ -22,7 +22,7 @@ from mav_robot_status.hardware.mavlink.state import text_assembly
 from mav_robot_status.hardware.mavlink.state.heartbeat_history import RUNS
 from mav_robot_status.hardware.mavlink.state.latest_messages import REMEMBERED
 from mav_robot_status.hardware.mavlink.state.vehicle_state import VehicleState
-from mav_robot_status.interface import Detail, IndustrialRobotStatusHandle, RobotMode, RobotStatus
+from mav_robot_status.interface import Detail, IndustrialRobotStatusHandle, RobotMode, RobotStatus, TriState
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.mavlink.encode import enclose
 from mav_robot_status.mavlink.framing import Parser
@@ -329,3 +329,76 @@ def test_any_payload_is_accepted(message_id: int, payload: bytes, version: int) 
 
 def test_every_handled_message_is_in_the_property_tests() -> None:
     assert set(HANDLERS) <= {definition.type for definition in USED}
+
+
+SIGNS_OF_A_STOP = st.one_of(
+    st.sampled_from(
+        [
+            text_message("RC7: MotorEStop HIGH", 6),
+            text_message("MotorEStop HIGH", 6),
+            text_message("RC7: MotorEStop LOW", 6),
+            text_message("PreArm: Motors Emergency Stopped", 2),
+            mav.CommandAck(218, 0, 0, 0, 255, 190),
+            mav.CommandLong(31, 2, 0, 0, 0, 0, 0, 218, 1, 1, 0),
+            mav.CommandLong(31, 0, 0, 0, 0, 0, 0, 218, 1, 1, 0),
+            mav.MissionCurrent(1),
+            mav.ParamValue(31.0, 0, 0, b"RC7_OPTION", 4),
+            mav.RcChannels(*[1900] * 18),
+            mav.RcChannels(*[1000] * 18),
+        ]
+    ),
+    st.integers(0, 3).map(lambda value: mav.NamedValueFloat(0, value, b"RS_STOP")),
+    st.sampled_from([FITTED | PREARM, FITTED]).map(
+        lambda health: mav.SysStatus(FITTED | PREARM, FITTED | PREARM, health, *[0] * 5)
+    ),
+)
+
+
+@QUICK
+@given(
+    evidence=st.lists(st.tuples(st.sampled_from([0.0, 0.1, 0.6, 1.0, 3.0, 4.0]), SIGNS_OF_A_STOP), max_size=20),
+    vehicle=st.sampled_from([(QUAD, (1000,) * 4, (1632,) * 4), (ROVER, (1500, 0, 1500), (1500, 0, 1700))]),
+)
+def test_no_order_of_evidence_makes_a_driven_vehicle_stopped(
+    evidence: list[tuple[float, Any]], vehicle: tuple[int, tuple[int, ...], tuple[int, ...]]
+) -> None:
+    vehicle_type, stop, driven = vehicle
+    flight = Flight(ARDUPILOT, vehicle_type, options=HardwareOptions(watch_outputs=True))
+    values = [stop]
+
+    def outputs() -> mav.ServoOutputRaw:
+        pulses = (*values[0], *[0] * 16)[:16]
+        return mav.ServoOutputRaw._make((*pulses[:8], 0, *pulses[8:]))
+
+    flight.stream("outputs", outputs, hz=4).stream("hud", lambda: mav.VfrHud(3.0, 0.0, 40), hz=4)
+    flight.wait(5)
+    flight.hb(armed=True, state=4)
+    values[0] = driven
+    flight.wait(2)
+    assert flight.status.drives_powered > TriState.FALSE
+    for seconds, message in evidence:
+        flight.wait(seconds)
+        flight.send(message, (255, 190) if isinstance(message, mav.CommandLong) else (1, 1))
+    flight.wait(2.0)
+    assert flight.status.e_stopped is not TriState.TRUE, flight.vehicle.handle.evidence["e_stopped"]
+    assert flight.status.drives_powered is not TriState.FALSE
+    assert flight.status.motion_possible is not TriState.FALSE
+
+
+@QUICK
+@given(st.lists(st.tuples(st.sampled_from([0.0, 0.1, 1.0, 4.0]), SIGNS_OF_A_STOP), max_size=20), st.booleans())
+def test_a_stopped_vehicle_is_never_live_without_evidence_of_a_release(
+    evidence: list[tuple[float, Any]], applet: bool
+) -> None:
+    flight = Flight(ARDUPILOT, ROVER)
+    flight.hb(armed=True, state=4).wait(2)
+    for seconds, message in evidence:
+        flight.wait(seconds)
+        flight.send(message, (255, 190) if isinstance(message, mav.CommandLong) else (1, 1))
+    flight.wait(4)
+    flight.send(mav.NamedValueFloat(0, 1, b"RS_STOP") if applet else text_message("RC7: MotorEStop HIGH", 6))
+    flight.wait(30)
+    flight.stop("heartbeat").wait(5)
+    flight.stream("heartbeat", flight.heartbeat).wait(30)
+    assert flight.status.e_stopped is not TriState.FALSE
+    assert flight.status.drives_powered is not TriState.TRUE

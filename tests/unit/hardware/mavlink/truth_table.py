@@ -7,7 +7,6 @@ import pathlib
 from typing import Any
 
 from mav_robot_status.clock import Instant
-from mav_robot_status.hardware.mavlink.autopilots import ARDUPILOT
 from mav_robot_status.hardware.mavlink.handlers import hear
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.state import estop, latches, motion, outputs, sensors
@@ -66,8 +65,9 @@ def state_of(inputs: dict[str, Any]) -> tuple[VehicleState, Instant]:
 def _would_be_ready(state: VehicleState, status: mav.SysStatus) -> bool:
     """Whether two such SYS_STATUS, well after the disarm, would have counted."""
     settled = state.heartbeats._replace(edge=Instant(0.0, 0))
-    stop = estop.heard_sys_status(estop.NOTHING, status, settled, state.profile, NOW.mono)
-    return stop.ready > 0 and state.profile is ARDUPILOT
+    checked = state.profile.stops.check is not None  # by a recent firmware
+    stop = estop.heard_sys_status(estop.NOTHING, status, settled, state.profile, checked, NOW.mono)
+    return stop.ready > 0
 
 
 def _watch(value: TriState, at: Instant) -> outputs.Watch:

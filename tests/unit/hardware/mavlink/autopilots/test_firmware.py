@@ -67,7 +67,7 @@ def version(flight: Flight) -> str | None:
 
 
 def test_the_version_is_unknown_until_it_is_told() -> None:
-    flight = copter().hb()
+    flight = copter(version=None).hb()
     assert version(flight) is None
     assert version(flight.send(V456)) == "4.5.6"
 

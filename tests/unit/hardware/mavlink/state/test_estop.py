@@ -4,20 +4,23 @@ import pytest
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.hardware.mavlink.autopilots import ARDUPILOT, PX4, Autopilot
+from mav_robot_status.hardware.mavlink.autopilots.firmware import Firmware
+from mav_robot_status.hardware.mavlink.identity import Family
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.state.estop import (
     NOTHING,
     READY_MESSAGES,
     Stop,
     heard_sys_status,
+    includes_stop,
     said,
     still_said,
 )
 from mav_robot_status.hardware.mavlink.state.heartbeat_history import HeartbeatHistory, first_heartbeat
 from mav_robot_status.interface import TriState
-from mav_robot_status.mavlink.definitions import AutopilotVersion, Heartbeat, ParamValue, SysStatus
+from mav_robot_status.mavlink.definitions import Heartbeat, ParamValue, SysStatus
 
-from ..driver import ACTIVE, FITTED, MOTORS, PREARM, STANDBY, TERMINATED, copter, px4
+from ..driver import ACTIVE, FITTED, MOTORS, PREARM, STANDBY, TERMINATED, copter, px4, version_of
 
 NOW = Instant(1000.0, 1_800_000_000_000_000)
 ALL = FITTED | PREARM
@@ -33,7 +36,8 @@ def beaten(armed: bool = False) -> HeartbeatHistory:
 
 def heard(stop: Stop, *messages: tuple[float, SysStatus], profile: Autopilot = ARDUPILOT, armed: bool = False) -> Stop:
     for seconds, status in messages:
-        stop = heard_sys_status(stop, status, beaten(armed), profile, NOW.mono + seconds)
+        checked = includes_stop(profile, Family.COPTER, Firmware(4, 5), False)
+        stop = heard_sys_status(stop, status, beaten(armed), profile, checked, NOW.mono + seconds)
     return stop
 
 
@@ -116,10 +120,6 @@ def test_a_stop_between_arming_and_the_armed_heartbeat_is_kept() -> None:
     assert flight.status.e_stopped is TriState.TRUE
 
 
-def version(major: int, minor: int, patch: int) -> AutopilotVersion:
-    return AutopilotVersion(major << 24 | minor << 16 | patch << 8 | 255)
-
-
 KILL, RELEASED = "Manual kill-switch engaged", "Manual kill-switch disengaged"
 
 
@@ -152,7 +152,7 @@ def test_a_copter_that_lands_under_power_in_termination_is_not_stopped() -> None
 def test_a_px4_that_does_not_show_its_kill_is_not_reported_released_without_evidence(armed: bool) -> None:
     flight = px4().hb(armed=armed, state=ACTIVE if armed else STANDBY)
     assert flight.status.e_stopped is TriState.FALSE
-    assert flight.send(version(1, 11, 3)).status.e_stopped is TriState.UNKNOWN
+    assert flight.send(version_of(1, 11, 3)).status.e_stopped is TriState.UNKNOWN
     why = flight.vehicle.handle.evidence["e_stopped"]
     assert (why.rule, why.source) == ("PX4 before 1.12 shows a kill in words alone", "AUTOPILOT_VERSION 1.11.3")
     assert flight.status.motion_possible is (TriState.TRUE if armed else TriState.FALSE)
@@ -164,7 +164,7 @@ def test_a_px4_that_does_not_show_its_kill_is_not_reported_released_without_evid
 @pytest.mark.parametrize(("told", "expected"), [(True, TriState.FALSE), (False, TriState.UNKNOWN)])
 def test_an_old_px4_released_at_arming_stays_released_if_every_stop_is_reported(told: bool, expected: TriState) -> None:
     flight = px4(options=HardwareOptions(estop_assume_visible=True)).hb(state=STANDBY)
-    flight.send(version(1, 11, 3))
+    flight.send(version_of(1, 11, 3))
     if told:
         flight.text(KILL, 0).text(RELEASED, 0)
     assert flight.hb(armed=True, state=ACTIVE).status.e_stopped is expected
@@ -175,7 +175,7 @@ def test_an_old_px4_released_at_arming_stays_released_if_every_stop_is_reported(
 def test_a_px4_of_a_version_that_shows_its_kill_or_of_unknown_version_is_trusted(
     message: tuple[int, int, int],
 ) -> None:
-    flight = px4().hb(armed=True, state=ACTIVE).send(version(*message))
+    flight = px4().hb(armed=True, state=ACTIVE).send(version_of(*message))
     assert flight.status.e_stopped is TriState.FALSE
 
 

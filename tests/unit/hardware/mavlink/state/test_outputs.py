@@ -4,7 +4,6 @@ import pytest
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.hardware.mavlink.identity import family_of
-from mav_robot_status.hardware.mavlink.rules.e_stopped import proves_stop
 from mav_robot_status.hardware.mavlink.state.heartbeat_history import HeartbeatHistory, first_heartbeat, next_heartbeat
 from mav_robot_status.hardware.mavlink.state.outputs import (
     HOLD,
@@ -12,7 +11,9 @@ from mav_robot_status.hardware.mavlink.state.outputs import (
     channels,
     heard_outputs,
     heartbeat_arrived,
+    hovers,
     is_vetoed,
+    proves_stop,
 )
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink.definitions import Heartbeat
@@ -39,11 +40,12 @@ class Machine:
         heartbeat_arrived(self.watch, after, before, enabled, self.type, self.now.mono)
         return self
 
-    def put(self, values: tuple[int, ...], throttle: float | None = 50, speed: float = 0.0) -> Machine:
+    def put(self, values: tuple[int, ...], throttle: float | None = 50, speed: float = 0.0, vtol: int = 0) -> Machine:
         self.now = later(self.now, 0.5)
         assert self.heartbeats is not None
         padded = (*values, *(0,) * 16)[:16]
-        heard_outputs(self.watch, padded, self.type, self.heartbeats, throttle, speed, self.now.mono)
+        falls = hovers(family_of(self.type), self.type, vtol)
+        heard_outputs(self.watch, padded, self.type, self.heartbeats, throttle, speed, self.now.mono, falls)
         return self
 
     def learn(self, values: tuple[int, ...] = STOP) -> Machine:
@@ -52,14 +54,14 @@ class Machine:
     def fly(self, values: tuple[int, ...] = FLYING) -> Machine:
         return self.beat(True).put(values)
 
-    def judge(self, speed: float = 0.0, after: float = 0.0, turning: float = 0.0) -> TriState:
+    def judge(self, speed: float = 0.0, after: float = 0.0, turning: float = 0.0, climb: float = 0.0) -> TriState:
         """TRUE held, FALSE driven, UNKNOWN neither."""
         watch, family = self.watch, family_of(self.type)
         if watch.driven:
             return TriState.FALSE
         if watch.held_since is None or self.now.mono + after < watch.held_since + HOLD:
             return TriState.UNKNOWN
-        if is_vetoed(watch, family, self.type, speed, turning) or not proves_stop(family, self.type):
+        if is_vetoed(watch, family, self.type, speed, climb, turning) or not proves_stop(family, self.type, 0):
             return TriState.UNKNOWN
         return TriState.TRUE
 
@@ -112,8 +114,8 @@ def test_several_assumed_channels_that_all_leave_their_stop_value_are_motors() -
 
 def test_an_increasing_speed_overrides_the_outputs() -> None:
     copter = Machine().learn().fly().put(STOP)
-    assert copter.judge(speed=0.6, after=2) is TriState.UNKNOWN
-    assert copter.judge(speed=-3.0, after=2) is TriState.TRUE
+    assert copter.judge(climb=0.6, after=2) is TriState.UNKNOWN
+    assert copter.judge(climb=-3.0, after=2) is TriState.TRUE
     rover = Machine(ROVER).learn((1500, 0, 1500)).fly((1500, 0, 1655)).put((1500, 0, 1500), speed=2.0)
     assert rover.judge(speed=2.2, after=2) is TriState.TRUE
     assert rover.judge(speed=2.6, after=2) is TriState.UNKNOWN
@@ -130,8 +132,8 @@ def test_a_rover_with_a_motor_on_each_side_is_not_held_while_it_turns_about_one_
     assert known.judge(**turning) is TriState.FALSE
 
 
-@pytest.mark.parametrize("vehicle_type", [HELI, PLANE, SUB])
-def test_only_multirotors_and_rovers_are_ever_held(vehicle_type: int) -> None:
+@pytest.mark.parametrize("vehicle_type", [HELI, SUB])
+def test_helicopters_and_subs_are_never_held(vehicle_type: int) -> None:
     functions = {1: 31} if vehicle_type == HELI else {1: 33}
     machine = Machine(vehicle_type, functions).learn().fly()
     assert machine.judge() is TriState.FALSE
@@ -159,7 +161,8 @@ def test_disarming_ends_the_evidence_of_the_outputs() -> None:
 def test_channels_come_from_the_parameters_or_else_from_the_vehicle_type() -> None:
     assert channels(Watch(), QUAD) == ((1, 2, 3, 4), True)
     assert channels(Watch(), ROVER) == ((3,), True)
-    assert channels(Watch(), PLANE) == ((), True)
+    assert channels(Watch(), PLANE) == ((3,), True)
+    assert channels(Watch(), SUB) == ((1, 2, 3, 4, 5, 6), True)
     skid = Watch(functions={1: 73, 2: 0, 3: 74})
     assert channels(skid, ROVER) == ((1, 3), False)
     assert channels(Watch(functions={1: 33, 8: 31}), HELI) == ((8,), False)

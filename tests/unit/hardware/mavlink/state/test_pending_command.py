@@ -9,6 +9,7 @@ import pytest
 from mav_robot_status.clock import Instant
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.state import pending_command
+from mav_robot_status.hardware.mavlink.state.estop import NOTHING
 from mav_robot_status.interface import RobotMode, TriState
 from mav_robot_status.mavlink import definitions as mav
 
@@ -141,9 +142,45 @@ def test_another_function_or_switch_position_is_ignored(params: tuple[float, flo
     assert flight.send(ack()).status.e_stopped is UNKNOWN
 
 
-def test_an_answer_belongs_to_the_latest_of_two_commands() -> None:
-    flight = stop(stop(driving(), HIGH), LOW)
-    assert flight.send(ack()).status.e_stopped is FALSE
+def test_an_answer_to_one_of_two_different_commands_proves_nothing() -> None:
+    flight = stop(stop(driving(), HIGH), LOW).send(ack())
+    assert flight.status[1:4] == (UNKNOWN, UNKNOWN, UNKNOWN)
+    assert flight.send(ack()).status[1:4] == (UNKNOWN, UNKNOWN, UNKNOWN)
+
+
+def test_an_answer_to_a_repeated_command_counts() -> None:
+    assert stop(stop(driving())).send(ack()).status.e_stopped is TRUE
+    refused = stop(stop(driving())).send(ack(result=DENIED))
+    assert refused.status[1:4] == (UNKNOWN, TRUE, TRUE)
+
+
+def test_another_function_that_waits_for_its_answer_makes_an_answer_ambiguous() -> None:
+    flight = stop(driving()).send(command(AUX, 9, HIGH), STATION)
+    assert flight.send(ack()).status.e_stopped is UNKNOWN
+
+
+def test_an_answer_without_a_target_is_ambiguous_if_two_stations_wait_for_one() -> None:
+    flight = stop(driving()).send(command(AUX, ESTOP, HIGH), OTHER_STATION)
+    assert flight.send(ack(to=(0, 0))).status.e_stopped is UNKNOWN
+
+
+def test_a_lost_answer_to_a_release_does_not_leave_a_stop() -> None:
+    flight = stop(stop(driving()).send(ack()), LOW)
+    assert flight.status[1:4] == (UNKNOWN, UNKNOWN, UNKNOWN)
+    assert flight.inhibits == {"STOP_UNCERTAIN": None}
+    flight.wait(60)
+    assert flight.status[1:4] == (UNKNOWN, UNKNOWN, UNKNOWN)
+
+
+def test_a_lost_answer_to_a_stop_does_not_leave_a_release() -> None:
+    flight = stop(stop(driving(), LOW).send(ack()), HIGH)
+    assert flight.status[1:4] == (UNKNOWN, UNKNOWN, UNKNOWN)
+
+
+@pytest.mark.parametrize(("position", "kept"), [(HIGH, (FALSE, TRUE, TRUE)), (LOW, (TRUE, FALSE, FALSE))])
+def test_a_refused_command_changes_nothing(position: int, kept: tuple[TriState, ...]) -> None:
+    flight = stop(stop(driving(), LOW if position == HIGH else HIGH).send(ack()), position)
+    assert flight.send(ack(result=DENIED)).status[1:4] == kept
 
 
 @pytest.mark.parametrize(("autopilot", "stopped"), [(PX4, FALSE), (0, UNKNOWN)])
@@ -189,9 +226,21 @@ def test_a_termination_that_is_not_requested_or_not_accepted_is_ignored() -> Non
 
 def test_only_relevant_commands_are_kept() -> None:
     now = Instant(100.0, 0)
-    assert pending_command.asked(command(400, 1), STATION, now) is None
-    assert pending_command.asked(command(AUX, ESTOP, HIGH), STATION, now) == (AUX, ESTOP, HIGH, STATION, 100.0)
+    assert pending_command.asked(command(400, 1), STATION, NOTHING, now) is None
+    kept = pending_command.asked(command(AUX, ESTOP, HIGH), STATION, NOTHING, now)
+    assert kept is not None
+    assert kept[:5] == (AUX, ESTOP, HIGH, STATION, 100.0)
+
+
+def test_few_commands_are_remembered_and_none_for_long() -> None:
+    pending = pending_command.NONE
+    for at in (0.0, *[100.0] * 20):
+        asked = pending_command.asked(command(AUX, ESTOP, HIGH), STATION, NOTHING, Instant(at, 0))
+        assert asked is not None
+        pending = pending_command.remembered(pending, asked)
+    assert len(pending) == pending_command.MOST
+    assert {one.at for one in pending} == {100.0}
 
 
 def test_an_answer_without_a_command_is_ignored() -> None:
-    assert not pending_command.is_answered(None, ack(), Instant(100.0, 0))
+    assert pending_command.answered((), ack(), Instant(100.0, 0)) == (None, ())

@@ -33,7 +33,7 @@ MOVES: Final[dict[type, tuple[str, ...]]] = {
     mav.ExtendedSysState: ("landed_state",),
     mav.GlobalPositionInt: ("movement",),
     mav.GpsRawInt: ("receiver_stands",),
-    mav.Heartbeat: ("latched", "stop"),
+    mav.Heartbeat: ("claimed", "latched", "stop"),
     mav.LocalPositionNed: ("movement",),
     mav.ParamValue: ("outputs", "outputs_vetoed", "stop_excused"),
     mav.ServoOutputRaw: ("outputs", "outputs_vetoed"),

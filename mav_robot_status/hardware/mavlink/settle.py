@@ -12,8 +12,10 @@ from ...interface.status import TriState
 from ...mavlink.enumerations import MAV_LANDED_STATE_UNDEFINED, MAV_STANDARD_MODE_NON_STANDARD
 from .autopilots.modes import ModeHints
 from .autopilots.sensor_weights import SOFT
+from .claims import HOLD, LIVE
 from .facts import (
     Cause,
+    Claimed,
     Explained,
     Facts,
     Fresh,
@@ -52,6 +54,8 @@ NOTHING_SAID: Final = Stop(UNKNOWN, None, False)
 NO_SYS_STATUS: Final = SystemStatus(False, UNKNOWN, None, False)
 NOTHING_LATCHED: Final = Latched((), False)
 NO_HINTS: Final = ModeHints()
+UNDISPUTED: Final = Claimed(None, False, False, False, False)
+DOUBTED: Final = UNDISPUTED._replace(doubted=True)
 
 
 def kind(state: VehicleState, moment: Moment, options: HardwareOptions) -> Kind:
@@ -232,6 +236,26 @@ def mode_hints(state: VehicleState, moment: Moment, options: HardwareOptions) ->
     return ModeHints(state.modes.get(number), standard_mode)
 
 
+def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Claimed:
+    """Whether another sender claims the ids. Disarmed is doubtful while any live claim is armed."""
+    claims = state.claims
+    conflict = claims.conflict
+    if conflict is None and not claims.others:
+        return UNDISPUTED
+    if conflict is not None and not moment.has_come(conflict.last + HOLD):
+        since = conflict.since.unix_us
+        armed = state.heartbeats.armed
+        all_armed = armed and moment.has_come(claims.disarmed_at + HOLD)
+        all_disarmed = not armed and moment.has_come(claims.armed_at + HOLD)
+        one_mode = moment.has_come(claims.differed_at + HOLD)
+        return new(Claimed, (since, True, all_armed, all_disarmed, one_mode))
+    if not state.heartbeats.armed and any(
+        claim.armed and not claim.copied and not moment.has_come(claim.at + LIVE) for claim in claims.others.values()
+    ):
+        return DOUBTED
+    return UNDISPUTED
+
+
 def text_overdue(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
     """Whether the missing chunks of a text are overdue."""
     return any(moment.has_come(partial.at + text_assembly.PATIENCE) for _, partial in state.texts)
@@ -258,6 +282,7 @@ SETTLE: Final[dict[str, Settle]] = {
     "latched": latched,
     "explained": explained,
     "mode_hints": mode_hints,
+    "claimed": claimed,
     "text_overdue": text_overdue,
 }
 """The function that settles each fact, in the order of `Facts`."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...interface import DEFAULT_HANDLE_NAME, Detail, IndustrialRobotStatusHandle, LinkState
+from .claims import Claims
 from .moment import Moment
 
 if TYPE_CHECKING:
@@ -28,10 +29,12 @@ class TrackedVehicle:
 
     __slots__ = (
         "boots",
+        "claims",
         "dirty",
         "facts",
         "handle",
         "ids",
+        "log_way_at",
         "losses",
         "moment",
         "parameters",
@@ -46,11 +49,15 @@ class TrackedVehicle:
         self.handle.detail = Detail(slot.system, slot.component, link=LinkState.NEVER_SEEN)
         self.ids: tuple[int, int] | None = None
         self.state: VehicleState | None = None
+        self.claims: Claims[Any] = Claims()
+        """Who speaks with its ids."""
         self.requests: Requests | None = None
         self.parameters: Parameters | None = None
         self.boots = 0
         self.losses = 0
         """How often the link was lost."""
+        self.log_way_at = -math.inf
+        """When a change of its way may be logged again."""
         self.facts: Facts | tuple[()] = ()
         """The facts that the status in the handle is derived from."""
         self.dirty = False

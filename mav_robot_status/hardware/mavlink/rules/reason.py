@@ -29,6 +29,7 @@ class Source(Enum):
     SWITCHES = "RCn_OPTION"
     STOP = "what was said of an emergency stop"
     LATCH = "what announced a cause"
+    CLAIMS = "what the senders with these ids say"
     ESC = "ESC telemetry"
     OUTPUTS = "SERVO_OUTPUT_RAW"
     LANDED_STATE = "EXTENDED_SYS_STATE"

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ....clock import Instant
 from ..autopilots import announced_as
+from ..claims import Claims
 from ..identity import Family, family_of
 from . import estop, latches, outputs, sensors, text_assembly
 from .boot_clock import BootClock
@@ -80,8 +81,8 @@ class VehicleState:
     """The sequence number of the latest EVENT."""
     boots: int = 0
     """Reboots seen."""
-    formerly: tuple[int, int] | None = None
-    """The autopilot and vehicle type that used these ids before."""
+    claims: Claims[Any] = field(default_factory=Claims, compare=False)
+    """Who speaks with its ids. It outlives reboots, and the vehicle itself."""
 
     profile: Autopilot = field(init=False)
     """The meaning of its messages."""
@@ -103,7 +104,7 @@ class VehicleState:
         self.latest.unsettled = True
 
 
-def begin(heartbeat: Heartbeat, now: Instant) -> VehicleState:
+def begin(heartbeat: Heartbeat, now: Instant, claims: Claims[Any] | None = None) -> VehicleState:
     """The state of a vehicle at its first heartbeat."""
     latest = LatestMessages()
     latest.heartbeat = heard(latest, heartbeat, now.mono, None)
@@ -113,4 +114,5 @@ def begin(heartbeat: Heartbeat, now: Instant) -> VehicleState:
         boot=BootClock(now.mono),
         vehicle_type=heartbeat.type,
         autopilot=heartbeat.autopilot,
+        claims=claims or Claims(),
     )

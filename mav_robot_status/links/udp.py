@@ -165,7 +165,8 @@ class UdpSender(UdpLink):
     """Kind `udpout`: sends to one peer, and receives from every address.
 
     The owner tells which address answers with MAVLink. Only that one counts until it is silent, or until an address
-    that is nearer to the target answers: a router may answer from another port. A name that does not resolve yet is not an error; until it does, every send counts as dropped.
+    that is nearer to the target answers: a router may answer from another port.
+    A name that does not resolve yet is not an error; until it does, every send counts as dropped.
     """
 
     def __init__(self, url: Url, fraction: RandomFraction = random.random) -> None:

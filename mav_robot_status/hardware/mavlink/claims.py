@@ -37,7 +37,8 @@ PERSISTS: Final = 5.0
 HOLD: Final = 10.0
 """Seconds for which a conflict lasts after its last evidence."""
 PROOFS: Final = 5
-"""Consecutive samples of a clock that prove two autopilots."""
+"""Consecutive samples of a clock that prove two autopilots, if they span PROOF seconds."""
+PROOF: Final = 2.0
 COPIES: Final = 3.0
 """Seconds within which a router delivers a copy of a heartbeat on another way."""
 CONTINUES: Final = 48
@@ -50,8 +51,6 @@ MOST_COPIES: Final = 16
 CLOCKS: Final = frozenset({2, 30, 32, 33})
 """Message ids with time_boot_ms: SYSTEM_TIME, ATTITUDE, positions."""
 NEVER: Final = -math.inf
-FORMER: Final = "former"
-"""The key of the claim of an earlier sender on the selected way."""
 
 C = TypeVar("C")
 """A way: any hashable value."""
@@ -80,21 +79,65 @@ class Conflict(NamedTuple):
 
 
 class Claim:
-    """What one sender last said with these ids."""
+    """What was last said with these ids on one way, or by one other component."""
 
-    __slots__ = ("at", "booted", "copied", "heartbeat", "way")
+    __slots__ = (
+        "armed_at",
+        "at",
+        "booted",
+        "broken",
+        "copied",
+        "counts",
+        "former_at",
+        "heartbeat",
+        "number",
+        "sequence",
+        "way",
+    )
 
-    def __init__(self, way: Any, heartbeat: Heartbeat, at: float, *, copied: bool = False) -> None:
+    def __init__(self, way: Any, heartbeat: Heartbeat, sequence: int, at: float) -> None:
         self.way, self.heartbeat, self.at = way, heartbeat, at
-        self.copied = copied
+        self.armed_at = at if is_armed(heartbeat) else NEVER
+        """When this count of sequence numbers said armed. NEVER if it said disarmed since."""
+        self.former_at = NEVER
+        """When another count last said armed. Nothing but time ends that."""
+        self.copied = False
         """Whether a router copied it from another way: then it is no claim of its own."""
         self.booted: float | None = None
         """When its autopilot booted, if it sent a clock."""
+        self.number = self.sequence = sequence
+        """The sequence numbers of the latest heartbeat and of the latest frame."""
+        self.broken = False
+        """Whether a frame since that heartbeat did not continue the count."""
+        self.counts = False
+        """Whether the sequence numbers change at all."""
 
     @property
     def armed(self) -> bool:
-        """Whether it says armed."""
+        """Whether the latest heartbeat says armed."""
         return is_armed(self.heartbeat)
+
+    @property
+    def doubt_at(self) -> float:
+        """When anyone on this way last said armed and did not say disarmed since."""
+        return self.armed_at if self.armed_at > self.former_at else self.former_at
+
+    def follow(self, sequence: int) -> None:
+        """Note the sequence number of a frame."""
+        if (sequence - self.sequence) & 255 > CONTINUES:
+            self.broken = True
+        self.sequence = sequence
+
+    def hear(self, heartbeat: Heartbeat, sequence: int, at: float, *, signed: bool = False) -> bool:
+        """Note a heartbeat. Returns whether it continues the count: then the sender of the one before sent it."""
+        continues = signed or not (self.broken or (sequence == self.number and self.counts))
+        if not continues:
+            self.former_at = max(self.former_at, self.armed_at)
+        self.armed_at = at if is_armed(heartbeat) else NEVER
+        if sequence != self.number:
+            self.number, self.counts = sequence, True
+        self.broken, self.heartbeat, self.at = False, heartbeat, at
+        return continues
 
 
 class Claims(Generic[C]):
@@ -103,9 +146,8 @@ class Claims(Generic[C]):
     __slots__ = (
         "_apart_since",
         "_copies",
-        "_counts",
-        "_number",
         "_proofs",
+        "_proofs_since",
         "_turns",
         "armed_at",
         "broken",
@@ -145,14 +187,12 @@ class Claims(Generic[C]):
         """When any sender but the selected one said armed; disarmed; and when two did not say the same."""
         self.verified_at = NEVER
         """When the latest frame with a verified signature arrived."""
-        self._counts = False
-        """Whether the sequence numbers of the selected way change at all."""
-        self._number = 0
-        """The sequence number of the latest heartbeat on the selected way."""
         self._apart_since: float | None = None
         self._proofs = 0
+        self._proofs_since = 0.0
         self._turns = Turns()
-        self._copies: deque[tuple[int, Heartbeat, Any, float]] = deque(maxlen=MOST_COPIES)
+        self._copies: deque[tuple[int, Heartbeat, float]] = deque(maxlen=MOST_COPIES)
+        """The latest heartbeats on the selected way, while there is another one."""
 
     # the selected way
 
@@ -160,34 +200,34 @@ class Claims(Generic[C]):
         """Process a heartbeat on the selected way. The first one selects its way."""
         at, mine = now.mono, self.mine
         if mine is None:
-            self.way, self.sequence, self._number, self._counts = way, sequence, sequence, False
-            self.mine = Claim(way, heartbeat, at)
+            self.way, self.mine = way, Claim(way, heartbeat, sequence, at)
             self._turns.heard(heartbeat, at)
-        else:
-            repeats = sequence == self._number and self._counts
-            if heartbeat != mine.heartbeat:
-                self._changed(mine, heartbeat, self.is_signed(at) or not (self.broken or repeats), now)
-                mine.heartbeat = heartbeat
-            if sequence != self._number:
-                self._number, self._counts = sequence, True
+        elif heartbeat == mine.heartbeat and not self.broken:
+            if sequence != mine.number:
+                mine.number, mine.counts = sequence, True
             mine.at = at
-        self.broken = False
+            if mine.armed_at != NEVER and is_armed(heartbeat):
+                mine.armed_at = at
+        else:
+            self._changed(mine, heartbeat, sequence, now)
+        self.sequence, self.broken = sequence, False
         if self.others:
-            self._copies.append((sequence, heartbeat, way, at))
+            if self.mine.counts:
+                self._copies.append((sequence, heartbeat, at))
             self._compare(None, now)
 
-    def _changed(self, mine: Claim, heartbeat: Heartbeat, continues: bool, now: Instant) -> None:
+    def _changed(self, mine: Claim, heartbeat: Heartbeat, sequence: int, now: Instant) -> None:
         """Something else is said on the selected way: by the vehicle, or by a second sender on it?"""
-        self._note(mine.heartbeat, mine.at)
-        if _stance(heartbeat) != _stance(mine.heartbeat):
+        before, armed_at = mine.heartbeat, mine.doubt_at
+        self._note(before, mine.at)
+        if _stance(heartbeat) != _stance(before):
             self.differed_at = now.mono
-        armed, same_kind = is_armed(heartbeat), _kind(heartbeat) == _kind(mine.heartbeat)
-        if armed != mine.armed or not same_kind:
-            former = self.others.pop(FORMER, None)
-            if not (continues and same_kind):
-                if former is not None and former.armed == armed != mine.armed and now.mono - former.at <= HOLD:
-                    self.contradict("two counts of sequence numbers, armed and disarmed", mine.way, now)
-                self.others[FORMER] = Claim(mine.way, mine.heartbeat, mine.at)
+        mine.broken = self.broken
+        continues = mine.hear(heartbeat, sequence, now.mono, signed=self.is_signed(now.mono))
+        if _kind(heartbeat) != _kind(before) and is_armed(before) and not mine.armed:
+            mine.former_at = armed_at  # no vehicle becomes another one
+        if mine.armed and not is_armed(before) and not continues and now.mono - armed_at <= HOLD:
+            self.contradict("two counts of sequence numbers, armed and disarmed", mine.way, now)
         turns = self._turns.heard(heartbeat, now.mono)
         if turns is not None:
             self.contradict(f"{turns} in turn", mine.way, now)
@@ -217,15 +257,14 @@ class Claims(Generic[C]):
 
     def keep(self, stays: Callable[[C], bool]) -> None:
         """Forget the other ways. If no way is left, forget everything."""
-        left = {key: claim for key, claim in self.others.items() if key is not FORMER and stays(claim.way)}
+        left = {key: claim for key, claim in self.others.items() if stays(claim.way)}
         if self.way is None or not stays(self.way):
             if not left:
                 self.forget()
                 return
             key = max(left, key=lambda key: left[key].at)
             self.mine = left.pop(key)
-            self.way = self.mine.way
-            self.broken = True
+            self.way, self.sequence, self.broken = self.mine.way, self.mine.sequence, True
         self.others = left
 
     # all other ways
@@ -242,7 +281,6 @@ class Claims(Generic[C]):
         if mine is None:
             return Outcome.SELECTED
         if self.is_signed(at):
-            self.unused += 1
             return Outcome.UNUSED
         claim = self.others.get(way)
         if at - mine.at > SILENCE:
@@ -251,34 +289,42 @@ class Claims(Generic[C]):
             contradicts = other_clock or other_kind or (mine.armed and not is_armed(heartbeat))
             if not contradicts or at - mine.at > timeout:
                 ran_before = claim is not None and claim.booted is not None and claim.booted < mine.at
-                self._select(way, mine)
+                self._select(way, mine, claim)
                 return Outcome.EXCHANGED if other_kind or (other_clock and ran_before) else Outcome.SELECTED
-        self.unused += 1
-        copied = self._is_copy(heartbeat, sequence, way, at)
-        self._copies.append((sequence, heartbeat, way, at))
-        if copied:
-            self._note_copy(claim, heartbeat, way, at)
+        if not self._is_copy(heartbeat, sequence, at):
+            self.claim(way, way, heartbeat, sequence, now)
+        elif claim is not None:
+            self._note_copy(claim, heartbeat, sequence, at)
         else:
-            self.claim(way, way, heartbeat, now)
+            claim = self._remember(way, Claim(way, heartbeat, sequence, at))
+            claim.copied, claim.armed_at = True, NEVER
         return Outcome.UNUSED
 
-    def claim(self, key: Hashable, way: Any, heartbeat: Heartbeat, now: Instant) -> None:
+    def claim(self, key: Hashable, way: Any, heartbeat: Heartbeat, sequence: int, now: Instant) -> None:
         """Note what another sender says. `key` identifies it: its way, or its ids if they are not these."""
         claim = self.others.get(key)
         if claim is None:
-            claim = self._remember(key, Claim(way, heartbeat, now.mono))
-        claim.heartbeat, claim.at, claim.copied = heartbeat, now.mono, False
+            self._remember(key, Claim(way, heartbeat, sequence, now.mono))
+        else:
+            claim.hear(heartbeat, sequence, now.mono)
+            claim.copied = False
         self._note(heartbeat, now.mono)
         if self.mine is not None and _stance(heartbeat) != _stance(self.mine.heartbeat):
             self.differed_at = now.mono
         self._compare(key, now)
 
+    def follow(self, way: C, sequence: int) -> None:
+        """Note the sequence number of a frame on a way that is not selected."""
+        self.unused += 1
+        claim = self.others.get(way)
+        if claim is not None:
+            claim.follow(sequence)
+
     def clock(self, way: C, other: float, booted: float | None, now: Instant) -> None:
         """Note that the autopilot on a way that is not selected booted at `other`; the one on the selected, `booted`.
 
-        After a reboot one way shows the new time before the other: PROOFS samples must contradict a live claim.
+        After a reboot one way shows the new time before the other. So one sample proves nothing.
         """
-        self.unused += 1
         claim, mine = self.others.get(way), self.mine
         if claim is None or mine is None:
             return
@@ -286,42 +332,49 @@ class Claims(Generic[C]):
         if now.mono - mine.at > LIVE or not _are_apart(other, booted):
             self._proofs = 0
             return
+        if self._proofs == 0:
+            self._proofs_since = now.mono
         self._proofs += 1
-        if self._proofs >= PROOFS:
+        if self._proofs >= PROOFS and now.mono - self._proofs_since >= PROOF:
             self._proofs = 0
             self.contradict("clocks of two autopilots", way, now)
 
-    def _select(self, way: C, mine: Claim) -> None:
-        """Select another way. The next call of `heard` notes what it says."""
+    def _select(self, way: C, before: Claim, claim: Claim | None) -> None:
+        """Select another way, with all that was said on it. `heard` then gets the heartbeat that selects it."""
         self.others.pop(way, None)
-        self.others.pop(FORMER, None)
-        mine.booted = None
-        self._note(mine.heartbeat, mine.at)
-        self.differed_at = mine.at
-        self._remember(mine.way, mine)
-        self.way, self.mine = way, None
+        before.booted = None
+        before.sequence, before.broken = self.sequence, self.broken
+        self._note(before.heartbeat, before.at)
+        self.differed_at = before.at
+        self._remember(before.way, before)
+        self.way, self.mine = way, claim
+        if claim is not None:
+            claim.copied = False
+            self.sequence, self.broken = claim.sequence, claim.broken
         self._turns, self._apart_since, self._proofs = Turns(), None, 0
+        self._copies.clear()
 
     def _remember(self, key: Hashable, claim: Claim) -> Claim:
         """Keep a claim. At the limit the oldest is dropped, the disarmed ones first."""
         if len(self.others) >= MOST_CLAIMS:
-            del self.others[min(self.others, key=lambda key: (self.others[key].armed, self.others[key].at))]
+            del self.others[min(self.others, key=lambda key: (self.others[key].doubt_at, self.others[key].at))]
         self.others[key] = claim
         return claim
 
-    def _is_copy(self, heartbeat: Heartbeat, sequence: int, way: C, at: float) -> bool:
-        """Whether the same heartbeat arrived on another way: a router forwards it on both."""
-        return self._counts and any(
-            number == sequence and message == heartbeat and place is not way and at - when <= COPIES
-            for number, message, place, when in self._copies
+    def _is_copy(self, heartbeat: Heartbeat, sequence: int, at: float) -> bool:
+        """Whether the same heartbeat arrived on the selected way not long ago: a router forwards it on both."""
+        return any(
+            number == sequence and message == heartbeat and at - when <= COPIES
+            for number, message, when in self._copies
         )
 
-    def _note_copy(self, claim: Claim | None, heartbeat: Heartbeat, way: C, at: float) -> None:
-        """A late copy that says armed does not end the claim of its way; any other says what was heard already."""
-        if claim is None:
-            self._remember(way, Claim(way, heartbeat, at, copied=True))
-        elif not is_armed(heartbeat) or (self.mine is not None and heartbeat == self.mine.heartbeat):
-            claim.heartbeat, claim.copied = heartbeat, True
+    def _note_copy(self, claim: Claim, heartbeat: Heartbeat, sequence: int, at: float) -> None:
+        """A copy says nothing new. A late one that says armed does not end what its way says of its own."""
+        late = self.mine is not None and heartbeat != self.mine.heartbeat and is_armed(heartbeat)
+        if not late or claim.copied:
+            armed_at = claim.armed_at
+            claim.hear(heartbeat, sequence, at)
+            claim.copied, claim.armed_at = True, min(claim.armed_at, armed_at)
 
     def _note(self, heartbeat: Heartbeat, at: float) -> None:
         """Note what is said beside the selected way, or no longer on it: for what all agree on during a conflict."""
@@ -339,7 +392,7 @@ class Claims(Generic[C]):
             return
         differing = None
         for key, claim in self.others.items():
-            if key is FORMER or claim.copied or at - claim.at > LIVE:
+            if claim.copied or at - claim.at > LIVE:
                 continue
             if claim.armed != mine.armed or (key == claim.way and _stance(claim.heartbeat) != _stance(mine.heartbeat)):
                 differing = claim

@@ -71,7 +71,9 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
         system=ids[0],
         component=ids[1],
         errors=tuple(error.cause for error in errors),
-        inhibits=() if possible is TRUE or (doubted and possible is not FALSE) else inhibits(facts, options, mode, stopped, before, now),
+        inhibits=()
+        if possible is TRUE or (doubted and possible is not FALSE)
+        else inhibits(facts, options, mode, stopped, before, now),
         vehicle=_vehicle(facts) if doubted and not facts.claimed.one_mode else _running(facts, mode),
         link=LinkState.CONNECTED,
     )

@@ -246,7 +246,7 @@ class MavlinkRobotHW(RobotHW):
         if not is_autopilot(heartbeat, ids[1]):
             return None
         if tracked is None:
-            tracked = self._discover(heartbeat, ids, now, way)
+            tracked = self._discover(frame, now, way)
         if tracked is not None:
             tracked.handle.heard_at = now.mono
             claims = tracked.claims
@@ -255,11 +255,10 @@ class MavlinkRobotHW(RobotHW):
                 self._log_conflict(tracked)
         return tracked
 
-    def _discover(
-        self, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant, way: Any
-    ) -> TrackedVehicle | None:
+    def _discover(self, frame: Values, now: Instant, way: Any) -> TrackedVehicle | None:
         """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
-        tracked = self._place(ids) or self._succeed(heartbeat, ids, now, way)
+        _, ids, _, heartbeat, _, _ = frame
+        tracked = self._place(ids) or self._succeed(frame, now, way)
         if tracked is None:
             self.ignored += 1
             return None
@@ -267,14 +266,13 @@ class MavlinkRobotHW(RobotHW):
         log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
         return tracked
 
-    def _succeed(
-        self, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant, way: Any
-    ) -> TrackedVehicle | None:
+    def _succeed(self, frame: Values, now: Instant, way: Any) -> TrackedVehicle | None:
         """The vehicle whose entry leaves the ids open, if this sender takes it over from the one before.
 
         Component 1 is the autopilot: it takes the entry at once from another component of its system, and what that one
         says stays a claim. Any other sender takes it only after a long silence. Until then it is a claim itself.
         """
+        _, ids, sequence, heartbeat, _, _ = frame
         for tracked in self._expected:
             owner = tracked.ids
             if owner is None or tracked.slot.component is not None or tracked.slot.system not in (None, ids[0]):
@@ -294,7 +292,7 @@ class MavlinkRobotHW(RobotHW):
                     tracked.claims.others[owner] = former
                 return tracked
             if same_system:
-                tracked.claims.claim(ids, way, heartbeat, now)
+                tracked.claims.claim(ids, way, heartbeat, sequence, now)
                 self._settle_claims(tracked, now)
         return None
 
@@ -304,6 +302,7 @@ class MavlinkRobotHW(RobotHW):
         claims, state = tracked.claims, tracked.state
         if claims.mine is None:
             return True
+        claims.follow(way, sequence)
         booted = state.boot.at if state is not None and state.boot.clock_ms is not None else None
         if message_id == HEARTBEAT_ID and is_autopilot(message, ids[1]):
             before = claims.way
@@ -320,7 +319,6 @@ class MavlinkRobotHW(RobotHW):
         elif message_id in CLOCKS:
             claims.clock(way, now.mono - message.time_boot_ms / 1000, booted, now)
         else:
-            claims.unused += 1
             return False
         self._settle_claims(tracked, now)
         return False

@@ -12,7 +12,7 @@ from ...interface.status import TriState
 from ...mavlink.enumerations import MAV_LANDED_STATE_UNDEFINED, MAV_STANDARD_MODE_NON_STANDARD
 from .autopilots.modes import ModeHints
 from .autopilots.sensor_weights import SOFT
-from .claims import HOLD, LIVE
+from .claims import HOLD, LIVE, NEVER
 from .facts import (
     Cause,
     Claimed,
@@ -240,7 +240,8 @@ def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Cl
     """Whether another sender claims the ids. Disarmed is doubtful while any live claim is armed."""
     claims = state.claims
     conflict = claims.conflict
-    if conflict is None and not claims.others:
+    mine = claims.mine
+    if conflict is None and not claims.others and (mine is None or mine.doubt_at == NEVER):
         return UNDISPUTED
     if conflict is not None and not moment.has_come(conflict.last + HOLD):
         since = conflict.since.unix_us
@@ -249,8 +250,9 @@ def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Cl
         all_disarmed = not armed and moment.has_come(claims.armed_at + HOLD)
         one_mode = moment.has_come(claims.differed_at + HOLD)
         return new(Claimed, (since, True, all_armed, all_disarmed, one_mode))
-    if not state.heartbeats.armed and any(
-        claim.armed and not claim.copied and not moment.has_come(claim.at + LIVE) for claim in claims.others.values()
+    if not state.heartbeats.armed and (
+        (mine is not None and not moment.has_come(mine.doubt_at + LIVE))
+        or any(not moment.has_come(c.doubt_at + LIVE) for c in claims.others.values())
     ):
         return DOUBTED
     return UNDISPUTED

@@ -129,19 +129,20 @@ def a_sensor_is_faulty_at_boot_and_the_clock_is_heard_late() -> None:
 
 
 def two_clocks_alternate_sample_by_sample() -> None:
-    flight = copter().stop("heartbeat")
-    for second in range(4):
+    flight = copter()
+    for _ in range(5):
         for boot_ms in (900_000, 0):
-            flight.wait(0.3).send(mav.SystemTime(0, boot_ms + flight.boot_ms))
-        assert second < 3 or 9002 in flight.codes
+            flight.wait(0.3)
+            flight.send(mav.SystemTime(0, boot_ms + flight.boot_ms))
+    assert 9002 in flight.codes
 
 
 def another_sender_disagrees_for_some_time() -> None:
     flight = copter()
-    for _ in range(12):
-        flight.wait(0.5)
+    for pause in (0.6, 2, 2):
+        flight.wait(pause)
         flight.hw.take(frame_of(flight.heartbeat()._replace(custom_mode=5)), flight.clock.now(), "another way")
-    assert flight.wait(1)[-1].error_code == 9002
+    assert flight.wait(2)[-1].error_code == 9002
 
 
 STORIES: Final[list[Callable[[], Any]]] = [

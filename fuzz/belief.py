@@ -98,6 +98,7 @@ class Said(NamedTuple):
     order: int
     way: tuple[str, int]
     data: bytes
+    who: int
     armed: bool | None
     """What a heartbeat of the true vehicle says; None: any other frame."""
 
@@ -180,15 +181,16 @@ class World:
         sender.ways, sender.forked = WAYS[who][place % len(WAYS[who])], forked
 
     def reboot(self, who: int) -> None:
-        """A sender reboots. It is disarmed and counts from zero."""
+        """A sender reboots. It is disarmed and counts from zero. That takes longer than a frame is late."""
         sender = self.senders[who]
+        self._late = [said for said in self._late if said.who != who]
+        heapq.heapify(self._late)
         sender.booted, sender.armed, sender.counts = self.now.mono, False, {}
 
     def exchange(self, kind: int, age: float) -> None:
-        """Another vehicle takes the place of the true one."""
+        """Another vehicle takes the place of the true one, and continues its count."""
         true = self.senders[TRUE_ONE]
         true.kind, true.booted = KINDS[kind], self.now.mono - age
-        true.counts = {way: count + 100 & 255 for way, count in true.counts.items()}
 
     def copy(self, who: int) -> None:
         """The other sender becomes alike, or unlike, the true one in its kind."""
@@ -224,7 +226,7 @@ class World:
         else:
             frames = [(way, _packed(message, self._count(sender, way))) for way in sender.ways]
         for number, (way, data) in enumerate(frames):
-            said = Said(self.now.mono, self._order, way, data, armed)
+            said = Said(self.now.mono, self._order, way, data, sender.who, armed)
             if fate == "late" or (fate == "twice" and number == 0):
                 heapq.heappush(self._late, said._replace(due=self.now.mono + LATE * (1 + number)))
             if fate in ("arrives", "twice"):

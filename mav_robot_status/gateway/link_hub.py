@@ -9,8 +9,8 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
 from ..config import Config
-from ..hardware.mavlink.claims import Claims
 from ..hardware.mavlink.message_table import COMMAND_IDS, WANTED_IDS
+from ..hardware.mavlink.state.claims import Claims
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
 from ..mavlink.signing import Verdict

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config
-    from ..hardware.mavlink.claims import Claims
     from ..hardware.mavlink.requests.scheduler import Ask
+    from ..hardware.mavlink.state.claims import Claims
     from ..interface import IndustrialRobotStatusInterface, IoSource
     from ..mavlink.framing import Frame
     from .endpoint import Channel, Endpoint

@@ -6,9 +6,9 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from ...gateway.observer import Observer
-from ...hardware.mavlink.claims import CLOCKS
 from ...hardware.mavlink.identity import is_autopilot, named
 from ...hardware.mavlink.state.boot_clock import APART
+from ...hardware.mavlink.state.claims import CLOCKS
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
 from ...mavlink.counters import count as add

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final
 from ...interface import DEFAULT_HANDLE_NAME, Detail, LinkState, RobotHW, RobotStatus
 from ...mavlink import definitions as mav
 from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
-from .claims import CLOCKS, CONTINUES, Claims, Outcome
 from .derive import derive
 from .evidence import EvidenceOfVehicle
 from .handlers import overheard, pass_time
@@ -25,6 +24,7 @@ from .requests.scheduler import Ask, RequestScheduler
 from .rules.inhibits import inhibit
 from .settle import claimed, facts_of
 from .state import motion
+from .state.claims import CLOCKS, CONTINUES, Claims, Outcome
 from .state.latest_messages import SILENCE
 from .state.vehicle_state import begin
 from .vehicle import ExpectedVehicle, TrackedVehicle

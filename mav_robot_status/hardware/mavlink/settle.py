@@ -12,7 +12,6 @@ from ...interface.status import TriState
 from ...mavlink.enumerations import MAV_LANDED_STATE_UNDEFINED, MAV_STANDARD_MODE_NON_STANDARD
 from .autopilots.modes import ModeHints
 from .autopilots.sensor_weights import SOFT
-from .claims import HOLD, LIVE, NEVER
 from .facts import (
     Cause,
     Claimed,
@@ -30,6 +29,7 @@ from .facts import (
 from .identity import sensor_name
 from .state import estop, latches, outputs, sensors, text_assembly
 from .state.boot_clock import GRACE
+from .state.claims import HOLD, LIVE, NEVER
 from .state.latest_messages import FRESH
 from .state.motion import SUSTAIN_OFF, SUSTAIN_ON
 from .state.speeds import driving_speed, speed_over_ground

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...interface import DEFAULT_HANDLE_NAME, Detail, IndustrialRobotStatusHandle, LinkState
-from .claims import Claims
 from .moment import Moment
+from .state.claims import Claims
 
 if TYPE_CHECKING:
     from .facts import Facts

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -12,8 +11,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from fuzz import belief
 from fuzz.belief import FATES, OTHER, PAUSES, TRUE_ONE, UnsafeError, World
-from mav_robot_status.hardware.mavlink import settle
-from mav_robot_status.hardware.mavlink.claims import Claim
+from mav_robot_status.hardware.mavlink import interface, settle
+from mav_robot_status.hardware.mavlink.facts import Claimed
+from mav_robot_status.hardware.mavlink.state import claims
 
 SENDERS = st.sampled_from((TRUE_ONE, OTHER))
 SENT_AS = st.sampled_from(sorted(set(FATES)))
@@ -83,22 +83,21 @@ def test_random_steps_find_no_unsafe_status_and_the_same_seed_takes_the_same_ste
     assert belief.run(4000, seed=7) is None
 
 
-@pytest.mark.parametrize(
-    ("owner", "name", "broken"),
-    [
-        (settle, "claimed", lambda *_: settle.UNDISPUTED),
-        (Claim, "hear", lambda claim, heartbeat, *_, **__: setattr(claim, "heartbeat", heartbeat) or True),
-    ],
-)
-def test_the_simulation_finds_a_gateway_that_does_not_compare_its_senders(
-    monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, broken: Any
-) -> None:
-    monkeypatch.setattr(owner, name, broken)
-    monkeypatch.setitem(settle.SETTLE, "claimed", settle.claimed)
+def test_the_simulation_finds_a_gateway_that_does_not_compare_its_senders(monkeypatch: pytest.MonkeyPatch) -> None:
+    def believe(*_: object) -> Claimed:
+        return settle.UNDISPUTED
+
+    monkeypatch.setitem(settle.SETTLE, "claimed", believe)
     monkeypatch.setattr(settle, "_ALL", tuple(settle.SETTLE.values()))
     found = belief.run(20_000, seed=1)
     assert found is not None
     assert "world = World()" in found
+
+
+def test_the_simulation_finds_a_gateway_that_ignores_sequence_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interface, "CONTINUES", 255)
+    monkeypatch.setattr(claims, "CONTINUES", 255)
+    assert belief.run(20_000, seed=1) is not None
 
 
 def test_a_finding_can_be_replayed_step_by_step() -> None:

@@ -13,7 +13,7 @@ import pytest
 from mav_robot_status.errors import LinkError
 from mav_robot_status.links import open_link
 from mav_robot_status.links.base import Link, Received
-from mav_robot_status.links.udp import ANSWER_SILENCE, UdpLink
+from mav_robot_status.links.udp import ANSWER_SILENCE, UdpLink, UdpSender
 from mav_robot_status.links.url import parse
 
 from .conftest import Names
@@ -250,6 +250,7 @@ def test_a_broadcaster_sends_to_all_until_a_peer_answers(
         (answer,) = heard(link)
         assert answer.data == b"I am"
         assert link.due() == math.inf  # no MAVLink yet
+        assert isinstance(link, UdpSender)
         link.answered(answer.source)
         assert link.due() == -math.inf
         link.service(100.0)
@@ -281,6 +282,7 @@ def test_a_broadcaster_drops_a_silent_peer_although_others_send(open_: Open, cro
     assert link.send(b"who is there")
     peer.send(b"first", ("127.0.0.1", link.port))
     (answer,) = heard(link)
+    assert isinstance(link, UdpSender)
     link.answered(answer.source)
     link.service(100.0)
     other.send(b"second", ("127.0.0.1", link.port))

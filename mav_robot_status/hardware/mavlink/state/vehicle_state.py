@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ....clock import Instant
 from ..autopilots import announced_as
-from ..claims import Claims
 from ..identity import Family, family_of
 from . import estop, latches, outputs, sensors, text_assembly
 from .boot_clock import BootClock
+from .claims import Claims
 from .heartbeat_history import HeartbeatHistory, first_heartbeat
 from .latest_messages import LatestMessages, heard
 from .motion import Motion

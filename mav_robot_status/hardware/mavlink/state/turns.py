@@ -5,12 +5,12 @@ from __future__ import annotations
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from ...mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
+from ....mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ...mavlink.definitions import Heartbeat
+    from ....mavlink.definitions import Heartbeat
 
 TURN: Final = 10.0
 """Seconds within which two autopilots with the same ids alternate."""

@@ -18,14 +18,14 @@ from collections import deque
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Final, Generic, NamedTuple, TypeVar
 
-from .state.boot_clock import APART
+from .boot_clock import APART
 from .turns import Turns, is_armed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
-    from ...clock import Instant
-    from ...mavlink.definitions import Heartbeat
+    from ....clock import Instant
+    from ....mavlink.definitions import Heartbeat
 
 LIVE: Final = 3.0
 """Seconds for which a claim counts. Two heartbeat periods of 1 s, with a margin."""
@@ -212,7 +212,7 @@ class Claims(Generic[C]):
             self._changed(mine, heartbeat, sequence, now)
         self.sequence, self.broken = sequence, False
         if self.others:
-            if self.mine.counts:
+            if self.mine is not None and self.mine.counts:
                 self._copies.append((sequence, heartbeat, at))
             self._compare(None, now)
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_robot_status.hardware.mavlink.claims import (
+from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.state.claims import (
     HOLD,
     LIVE,
     MOST_CLAIMS,
@@ -19,7 +20,6 @@ from mav_robot_status.hardware.mavlink.claims import (
     Claims,
     Outcome,
 )
-from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.vehicle import ExpectedVehicle
 from mav_robot_status.interface import RobotMode, TriState
 from mav_robot_status.mavlink import definitions as mav

@@ -1,4 +1,7 @@
-"""`python -m fuzz TARGET [--count N]`: run a target on mutations of its corpus, with atheris or the plain mutator."""
+"""`python -m fuzz TARGET [--count N]`: run a target on mutations of its corpus, with atheris or the plain mutator.
+
+The target `belief` is a simulation and has no corpus.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,11 @@ import tempfile
 import time
 from pathlib import Path
 
+from . import belief
 from .mutate import inputs
 from .targets import TARGETS, UNITS
 
+BELIEF = "belief"
 CORPUS = Path(__file__).parent / "corpus"
 TOKENS = {
     "configuration": b"links: outs: vehicles: identity: hardware: requests: signing: type: publishers: url: passive: "
@@ -22,7 +27,7 @@ TOKENS = {
 def main() -> int:
     """The command."""
     parser = argparse.ArgumentParser(prog="python -m fuzz", description=__doc__)
-    parser.add_argument("target", choices=sorted(TARGETS))
+    parser.add_argument("target", choices=sorted((*TARGETS, BELIEF)))
     parser.add_argument("--count", type=int, default=100_000, help="units (frames, files) to try (100000)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the plain mutator (1)")
     parser.add_argument(
@@ -31,6 +36,8 @@ def main() -> int:
         help="guide the mutations by coverage with atheris; needs `pip install atheris`",
     )
     options = parser.parse_args()
+    if options.target == BELIEF:
+        return simulated(options.count, options.seed)
     if options.atheris:
         return coverage_guided(options.target, options.count)
     target = TARGETS[options.target]
@@ -49,6 +56,17 @@ def main() -> int:
     print(
         f"{options.target}: {done} {UNITS.get(options.target, 'frames')} in {number} inputs, {seconds:.0f} s: no defect"
     )
+    return 0
+
+
+def simulated(count: int, seed: int) -> int:
+    """Random steps of two senders with one id. Prints the steps to a defect."""
+    started = time.monotonic()
+    found = belief.run(count, seed)
+    if found is not None:
+        print(found, file=sys.stderr)
+        return 1
+    print(f"{BELIEF}: {count} steps of seed {seed}, {time.monotonic() - started:.0f} s: no defect")
     return 0
 
 

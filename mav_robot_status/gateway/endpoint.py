@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 from ..hardware.mavlink.message_table import WANTED_IDS
 from ..links.base import ServesClients
 from ..links.guarded import open_guarded
+from ..links.udp import UdpSender
 from ..links.url import parse
 from ..mavlink.counters import Counters
 from ..mavlink.framing import Parser
@@ -21,13 +22,17 @@ if TYPE_CHECKING:
     from ..config import LinkConfig
     from ..links.base import Address, Link
     from ..mavlink.encode import Encoder
+    from ..mavlink.framing import Frame
 
 log = logging.getLogger(__name__)
 
 MOST_SOURCES: Final = 64
-"""Limit of channels of one link. The one silent longest is dropped."""
+"""Limit of channels of one link. The one silent longest is dropped, but none on which a vehicle speaks."""
 MOST_PEERS: Final = 8
-PEER_SILENCE: Final = 30.0  # s
+PEER_SILENCE: Final = 30.0
+"""Seconds of silence after which a peer is no peer any more."""
+NEWCOMER_SILENCE: Final = 5.0
+"""Seconds for which a silent newcomer keeps its place. Who has spoken for longer keeps it for as long."""
 ACTIVE: Final = 10.0
 """Seconds since the last valid frame for which a peer counts as active."""
 NEVER: Final = -math.inf
@@ -36,7 +41,19 @@ NEVER: Final = -math.inf
 class Channel:
     """One peer of a link: a MAVLink channel with its own sequence numbers. Compared by identity."""
 
-    __slots__ = ("active_at", "encoders", "endpoint", "frames", "heard_at", "interval", "parser", "source", "systems")
+    __slots__ = (
+        "active_at",
+        "encoders",
+        "endpoint",
+        "frames",
+        "heard_at",
+        "interval",
+        "is_peer",
+        "parser",
+        "since",
+        "source",
+        "systems",
+    )
 
     def __init__(self, endpoint: Endpoint, source: Address, parser: Parser) -> None:
         self.endpoint = endpoint
@@ -45,12 +62,16 @@ class Channel:
         self.parser = parser
         self.heard_at = NEVER
         """When (monotonic seconds) the last heartbeat arrived: of an autopilot, or of any component on an out."""
+        self.since = 0.0
+        """The first of these heartbeats."""
+        self.is_peer = not endpoint.listens
+        """Whether we send to it, and accept its requests."""
         self.interval: float | None = None
         """Seconds between two ROBOT_STATUS, as this peer requested. None: the default. inf: no messages."""
         self.encoders: dict[int, Encoder] = {}
         """By our system id."""
-        self.frames = parser.counters.frames
-        """The frames of the parser when `note_activity` was called last."""
+        self.frames = -1
+        """The frames of the parser when `Endpoint.forget_silent` was called last."""
         self.active_at = NEVER
         self.systems: set[int] = set()
         """The system ids of the vehicles that are heard there: messages about others are not sent there."""
@@ -64,6 +85,11 @@ class Channel:
     def passive(self) -> bool:
         """Whether sending there is forbidden."""
         return self.endpoint.passive
+
+    def gives_way(self, now: float) -> bool:
+        """Whether it leaves its place to another, because no vehicle speaks on it."""
+        spoken = max(NEWCOMER_SILENCE, self.heard_at - self.since)
+        return now - self.heard_at > min(spoken, PEER_SILENCE)
 
     def __str__(self) -> str:
         """For example `10.1.2.3:14550, listening on 0.0.0.0:14550/udp`."""
@@ -95,14 +121,22 @@ class Endpoint:
         self.speech = Speech()
         self._wanted: frozenset[int] | None = WANTED_IDS
         self._channels: OrderedDict[Address, Channel] = OrderedDict()
+        self._scratch = Parser(self._wanted)
+        """Parses the first bytes of an address. Only a valid frame gives it a channel."""
+        self._stranger: Address = None
+        """The address whose bytes it has."""
         self.is_out = is_out
         self.adjust(config, number, keep_all=keep_all)
         self.must_speak = url.kind.speaks_first
         self.listens = url.kind.listens
         """Whether each source address is a peer. Otherwise the link has one peer, whatever the address."""
         self._source: Address = None
+        """The address of the one peer."""
         self.connections = 0
         """How many connections a link with one peer has had."""
+        self._source_at = NEVER
+        self._asks = self.link if isinstance(self.link, UdpSender) else None
+        """A link that sends to one peer and receives datagrams of any address."""
         if not self.listens:
             self._only = self._channels[None] = Channel(self, None, Parser(self._wanted))
 
@@ -117,51 +151,84 @@ class Endpoint:
         if wanted is not self._wanted:
             self._wanted = wanted
             for channel in self._channels.values():
-                parser = Parser(wanted)
-                parser.counters.add(channel.parser.counters)
-                channel.parser = parser
+                channel.parser = _renewed(channel.parser, wanted)
+            self._scratch = _renewed(self._scratch, wanted)
 
-    def channel(self, source: Address) -> Channel:
-        """The channel of one address."""
-        if not self.listens:
-            if source != self._source:  # a new connection: drop the incomplete frame of the last one
-                self._source = source
-                self.connections += 1
-                self._only.parser.reset()
+    def channel(self, source: Address, now: float) -> Channel | None:
+        """The channel of one address. None for an address that sent no valid frame yet: see `hear_stranger`."""
+        if self.listens:
+            channel = self._channels.get(source)
+            if channel is not None and len(self._channels) > 1:
+                self._channels.move_to_end(source)
+            return channel
+        if source != self._source:
+            if self._asks is not None:
+                return None
+            self._source = source  # a new connection: drop the incomplete frame of the last one
+            self.connections += 1
+            self._only.parser.reset()
+        self._source_at = now
+        return self._only
+
+    def hear_stranger(self, data: bytes, source: Address, now: float) -> tuple[Channel | None, list[Frame]]:
+        """Parse data of an address without a channel. A valid frame gives it one, if there is a place."""
+        parser = self._scratch
+        if source != self._stranger:
+            self._stranger = source
+            parser.reset()
+        before = parser.counters.frames
+        frames = parser.feed(data)
+        if parser.counters.frames == before:
+            return None, []
+        channel = self._admit(source, now)
+        return channel, frames if channel is not None else []
+
+    def _admit(self, source: Address, now: float) -> Channel | None:
+        """A channel for an address that speaks MAVLink. It gets the parser of its first bytes."""
+        self._stranger = None
+        if self._asks is not None:
+            if not self._asks.may_answer(source, self._source, now - self._source_at):
+                return None
+            self._asks.answered(source)
+            self._source, self._source_at = source, now
+            self._only.parser, self._scratch = self._scratch, self._only.parser
             return self._only
-        channel = self._channels.get(source)
-        if channel is None:
-            if len(self._channels) < MOST_SOURCES:
-                parser = Parser(self._wanted)
-            else:  # reused: a new one costs as much as parsing a hundred frames, too much in a flood
-                parser = self._channels.popitem(last=False)[1].parser
-                parser.reset()
-            channel = self._channels[source] = Channel(self, source, parser)
-        elif len(self._channels) > 1:
-            self._channels.move_to_end(source)
+        spare = None  # reused: a new one costs as much as parsing a hundred frames, too much in a flood
+        if len(self._channels) >= MOST_SOURCES:
+            oldest = next((key for key, channel in self._channels.items() if channel.gives_way(now)), None)
+            if oldest is None:
+                return None
+            spare = self._channels.pop(oldest).parser
+        channel = self._channels[source] = Channel(self, source, self._scratch)
+        self._scratch = spare or Parser(self._wanted)
         return channel
 
     def heard(self, channel: Channel, now: float) -> bool:
-        """Note a heartbeat. On a listening link the channel becomes a peer, up to MOST_PEERS. True if it is new."""
-        if channel.heard_at > NEVER or not self.listens:
-            channel.heard_at = now
-            return False
-        if sum(1 for _ in self.peers()) >= MOST_PEERS:
-            return False
+        """Note a heartbeat. On a listening link the channel becomes a peer, up to MOST_PEERS. True if it is new.
+
+        A peer that is silent gives its place to one that speaks.
+        """
+        if now - channel.heard_at > PEER_SILENCE:
+            channel.since = now
         channel.heard_at = now
+        if channel.is_peer:
+            return False
+        peers = list(self.peers())
+        if len(peers) >= MOST_PEERS:
+            silent = min(peers, key=lambda peer: peer.heard_at)
+            if not silent.gives_way(now):
+                return False
+            silent.is_peer, silent.interval = False, None
+        channel.is_peer = True
         return True
 
     def peers(self) -> Iterator[Channel]:
         """The channels that get messages from us."""
-        return (c for c in self._channels.values() if c.heard_at > NEVER or not self.listens)
+        return (channel for channel in self._channels.values() if channel.is_peer)
 
     def channels(self) -> Iterator[Channel]:
         """All channels."""
         return iter(self._channels.values())
-
-    def is_peer(self, channel: Channel) -> bool:
-        """Whether we send to this channel, and accept its requests."""
-        return channel.heard_at > NEVER or not self.listens
 
     def is_active(self, source: Address) -> bool:
         """Whether valid frames arrive from this address. A server with too many clients drops others first."""
@@ -176,13 +243,15 @@ class Endpoint:
             elif now - channel.active_at > ACTIVE:
                 channel.active_at = NEVER
             if now - channel.heard_at > PEER_SILENCE:
-                channel.heard_at, channel.interval = NEVER, None if self.listens else channel.interval
+                channel.heard_at = NEVER
+                if self.listens:
+                    channel.is_peer, channel.interval = False, None
 
     def totals(self) -> Counters:
         """The counters of all channels, added up."""
         total = Counters()
-        for channel in self._channels.values():
-            total.add(channel.parser.counters)
+        for parser in (self._scratch, *(channel.parser for channel in self._channels.values())):
+            total.add(parser.counters)
         return total
 
     def log_silence(self) -> None:
@@ -213,3 +282,10 @@ class Endpoint:
             self.speech.said,
             self.speech.withheld,
         )
+
+
+def _renewed(parser: Parser, wanted: frozenset[int] | None) -> Parser:
+    """A parser for other messages, with the same counters."""
+    new = Parser(wanted)
+    new.counters.add(parser.counters)
+    return new

@@ -1,4 +1,4 @@
-"""All live links: receive on them, select paths, forward, and send under our identity."""
+"""All live links: receive on them, forward, and send under our identity."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ..config import Config
 from ..hardware.mavlink.message_table import COMMAND_IDS, WANTED_IDS
+from ..hardware.mavlink.state.claims import Claims
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
 from ..mavlink.signing import ACCEPTED, Verdict
 from .arrival import BATCH, USUAL, Arrivals, Pause
 from .endpoint import Endpoint
-from .path_selection import PathSelection
 from .routing import Router
 from .sender import Sender, speaks_for
 from .signing_policy import proof
@@ -49,11 +49,10 @@ class LinkHub:
         self.sender = Sender(clock)
         self.offered: frozenset[int]
         """The messages that a consumer can request from us."""
-        self.paths: PathSelection[Channel] = PathSelection()
+        self.claims: dict[tuple[int, int], Claims[Channel]] = {}
+        """Who speaks with the ids of each vehicle. The hardware interface fills it."""
         self.needs_turn = False
         """True if something was received that needs a turn at once. The hardware interface resets it."""
-        self.conflicts: set[tuple[int, int]] = set()
-        """Ids that two autopilots claim, found since the last turn."""
         self.arrivals = Arrivals()
         self.late = False
         """Whether `receive_late` has to be used: some input may be old."""
@@ -101,7 +100,8 @@ class LinkHub:
         self._close_links(endpoints)
         self._channels = None
         self._requests = {(channel, ids) for channel, ids in self._requests if channel.endpoint in self.endpoints}
-        self.paths.keep(lambda channel: channel.endpoint in self.endpoints)
+        for claims in self.claims.values():
+            claims.keep(lambda channel: channel.endpoint in self.endpoints)
 
     def _close_links(self, endpoints: list[Endpoint]) -> None:
         with ExitStack() as steps:  # close all, even if one raises
@@ -133,8 +133,13 @@ class LinkHub:
                 self._observe(pieces, now)
             whole = _joined(pieces) if len(pieces) > 1 and not self._keep_all else pieces
             for data, source in whole:
-                channel = endpoint.channel(source)
-                frames = channel.parser.feed(data)
+                channel = endpoint.channel(source, now.mono)
+                if channel is not None:
+                    frames = channel.parser.feed(data)
+                else:
+                    channel, frames = endpoint.hear_stranger(data, source, now.mono)
+                    if channel is None:
+                        continue
                 if self._keep_all:
                     frames = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
                     self._record(frames, now)
@@ -200,41 +205,39 @@ class LinkHub:
             if endpoint.is_out:
                 self._note_heartbeat(channel, now.mono)
         elif frame.message_id in COMMAND_IDS:
-            if endpoint.is_peer(channel) and verdict in (None, Verdict.VERIFIED):
+            if channel.is_peer and verdict in (None, Verdict.VERIFIED):
                 self._handle_command(frame, channel)
-            return self._is_delivered(frame, channel, now.mono)
+            return self._is_delivered(frame, channel)
         if endpoint.is_out:
             return False
-        if verdict is Verdict.VERIFIED:  # its time stamp proves that it is newer than all before, on every path
-            self.paths.take(frame.ids, channel, now.mono)
-            return True
-        return self._is_on_path(frame, channel, now.mono)
+        if verdict is not None and (claims := self.claims.get(frame.ids)) is not None:
+            if verdict is not Verdict.VERIFIED:
+                return not claims.is_signed(now.mono)
+            claims.verified(channel, now.mono)  # its time stamp proves that it is newer than all before, on every way
+        return True
 
-    def _is_delivered(self, frame: Frame, channel: Channel, now: float) -> bool:
-        """Whether a command reaches the vehicle: it arrived on the vehicle's own path, or is forwarded there."""
+    def _is_delivered(self, frame: Frame, channel: Channel) -> bool:
+        """Whether a command reaches the vehicle: it arrived on the vehicle's own way, or is forwarded there."""
         system = frame.message.target_system
-        paths = {self.paths.channel(ids) for ids in self.paths.vehicles() if ids[0] == system}
-        if channel in paths:
+        ways = {way for ids in self.vehicles() if ids[0] == system and (way := self.way_of(ids)) is not None}
+        if channel in ways:
             return True
-        if self._router is None or not channel.endpoint.is_peer(channel) or self._channels is None:
+        if self._router is None or not channel.is_peer:
             return False
-        return not paths.isdisjoint(self._router.destinations(frame, channel, self._channels, now))
+        return not ways.isdisjoint(self._router.decided(frame, channel))
 
-    def _is_on_path(self, frame: Frame, channel: Channel, now: float) -> bool:
-        """Whether a frame arrived on the selected path of its vehicle. Notes conflicts."""
-        if self.paths.accepts(frame, channel, now):
-            return True
-        channels = self.paths.conflict(frame, channel)
-        if channels is not None:
-            self.needs_turn = True
-            self.conflicts.add(frame.ids)
-            log.warning("two autopilots claim the ids %d.%d: %s and %s", *frame.ids, *channels)
-        return False
+    def way_of(self, ids: tuple[int, int]) -> Channel | None:
+        """The channel that counts for a vehicle; None if it was not heard."""
+        claims = self.claims.get(ids)
+        return None if claims is None else claims.way
+
+    def vehicles(self) -> frozenset[tuple[int, int]]:
+        """The ids of the vehicles that are heard on a link."""
+        return frozenset(ids for ids, claims in self.claims.items() if claims.way is not None)
 
     def heard_vehicle(self, ids: tuple[int, int], channel: Channel, now: float) -> None:
-        """Note a heartbeat of a vehicle on this channel."""
+        """Note a heartbeat of a vehicle on this channel, which is its selected way."""
         self._note_heartbeat(channel, now)
-        self.paths.learn(ids, channel, now)
         channel.systems.add(ids[0])
 
     def _note_heartbeat(self, channel: Channel, now: float) -> None:
@@ -254,7 +257,7 @@ class LinkHub:
         if found.once == HEARTBEAT:
             self.sender.send_heartbeat(channel, found.system)
         elif found.once == ROBOT_STATUS:
-            vehicles = {system for system, _ in self.paths.vehicles()}
+            vehicles = {system for system, _ in self.vehicles()}
             self.needs_turn = True
             self._requests |= {(channel, v) for v in vehicles if self.sender.component.system_for(v) == found.system}
 
@@ -266,7 +269,7 @@ class LinkHub:
 
     def _forward(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant) -> None:
         """Forward frames by MAVLink's routing rules."""
-        if self._router is None or not channel.endpoint.is_peer(channel):
+        if self._router is None or not channel.is_peer:
             return
         if self._channels is None:
             self._channels = tuple(channel for endpoint in self.endpoints for channel in endpoint.peers())
@@ -281,8 +284,7 @@ class LinkHub:
         """The vehicles on passive links. Nothing may be sent to them."""
         if not any(endpoint.passive for endpoint in self.endpoints):
             return NONE
-        paths = ((ids, self.paths.channel(ids)) for ids in self.paths.vehicles())
-        return frozenset(ids for ids, path in paths if path is None or path.passive)
+        return frozenset(ids for ids, claims in self.claims.items() if claims.way is None or claims.way.passive)
 
     def audiences(self) -> list[Audience]:
         """The receivers of statuses: peers and outs. Not serial vehicle links: autopilots drop unknown ids."""
@@ -317,27 +319,27 @@ class LinkHub:
             for channel in endpoint.channels():
                 channel.systems.clear()
         self._channels = None
-        self.paths.retain({tracked.ids for tracked in vehicles})
         for tracked in vehicles:
-            path = self.paths.channel(tracked.ids) if tracked.ids is not None and speaks_for(tracked) else None
+            path = self.way_of(tracked.ids) if tracked.ids is not None and speaks_for(tracked) else None
             if path is not None and tracked.ids is not None:
                 path.systems.add(tracked.ids[0])
         self.sender.speak(self.endpoints, vehicles, self.config.identity.heartbeat)
 
     def ask(self, request: Ask) -> None:
         """Send a request to a vehicle."""
-        path = self.paths.channel((request.system, request.component))
+        path = self.way_of((request.system, request.component))
         if path is not None:
             path.endpoint.speech.count(self.sender.send(path, request.message, request.system))
 
     def vehicles_on(self, endpoint: Endpoint) -> list[tuple[int, int]]:
         """The ids of the vehicles that are heard on a link."""
-        paths = ((ids, self.paths.channel(ids)) for ids in self.paths.vehicles())
-        return [ids for ids, path in paths if path is not None and path.endpoint is endpoint]
+        return [
+            ids for ids, claims in self.claims.items() if claims.way is not None and claims.way.endpoint is endpoint
+        ]
 
     def may_ask(self, ids: tuple[int, int], number: int) -> bool:
         """Whether the link of a vehicle has room for this number of requests and one more, in this second."""
-        path = self.paths.channel(ids)
+        path = self.way_of(ids)
         return path is not None and path.endpoint.speech.has_room_for(number * REQUEST_SIZE)
 
     # logging and closing
@@ -352,12 +354,8 @@ class LinkHub:
         with ExitStack() as steps:  # close all, even if one raises
             steps.callback(self._close_links, self.endpoints)
             steps.callback(self.sender.close)
-        if self.paths.duplicates:
-            log.info(
-                "%d duplicate frames on other paths, %d path changes",
-                self.paths.duplicates,
-                self.paths.changes,
-            )
+        if unused := sum(claims.unused for claims in self.claims.values()):
+            log.info("%d duplicate frames on other paths", unused)
 
     def log_silence(self) -> None:
         """Log that no autopilot is heard, with a line for each vehicle link."""

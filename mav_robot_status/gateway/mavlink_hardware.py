@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ..hardware.mavlink.interface import MavlinkRobotHW
 from ..hardware.mavlink.vehicle import ExpectedVehicle
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config
+    from ..hardware.mavlink.state.claims import Claims
     from ..interface import IndustrialRobotStatusInterface, IoSource
     from ..mavlink.framing import Frame
     from .endpoint import Channel, Endpoint
@@ -32,10 +33,10 @@ HEARTBEAT_PERIOD: Final = 1.0  # s
 FIRST_SILENCE, LATER_SILENCE = 3.5, 30.0  # s without an autopilot until the first log line, and between later ones
 
 
-def robot_hw(config: Config) -> MavlinkRobotHW:
+def robot_hw(config: Config, claims: dict[tuple[int, int], Claims[Any]] | None = None) -> MavlinkRobotHW:
     """The vehicles of a configuration, in the state before the first heartbeat."""
     slots = [ExpectedVehicle(v.system, v.component, v.handle) for v in config.vehicles]
-    vehicles = MavlinkRobotHW(config.hardware, slots, config.identity.component)
+    vehicles = MavlinkRobotHW(config.hardware, slots, config.identity.component, claims)
     vehicles.speak_as(config.identity.system, config.identity.component)
     return vehicles
 
@@ -46,7 +47,7 @@ class MavlinkHardware:
     def __init__(self, config: Config, clock: Callable[[], Instant], observers: Sequence[Observer] = ()) -> None:
         """Open the links. Raises LinkError, UsageError."""
         self.hub = LinkHub(config, clock, observers)
-        self.vehicles = robot_hw(config)
+        self.vehicles = robot_hw(config, self.hub.claims)
         self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
         self.changed = False
         self.observers = observers
@@ -76,13 +77,13 @@ class MavlinkHardware:
         error some links are closed: change back.
         """
         self.hub.change(config)
-        self.vehicles.forget(frozenset(self.hub.paths.vehicles()))
+        self.vehicles.forget(self.hub.vehicles())
         self.vehicles.changed = True
         self._configure(config)
 
     def renew(self) -> None:
         """Use the vehicles and options of the new configuration. Vehicles in both keep their state."""
-        before, self.vehicles = self.vehicles, robot_hw(self._config)
+        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.claims)
         self.vehicles.adopt(before)
         self.vehicles.asks = before.asks
         self.handles = self.vehicles.handles
@@ -110,7 +111,7 @@ class MavlinkHardware:
                 continue
             if vehicles.deadline < at.mono:
                 vehicles.read(at)
-            vehicle = vehicles.take(frame, at)
+            vehicle = vehicles.take(frame, at, channel)
             if vehicle is not None and vehicle.ids is not None:
                 self.hub.heard_vehicle(vehicle.ids, channel, at.mono)
             if self.observers:
@@ -119,8 +120,9 @@ class MavlinkHardware:
     def observe(self, heard: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
         """Pass the frames of vehicles to the observers."""
         for observer in self.observers:
-            for frame, _ in heard:
-                if self.vehicles.find(*frame.ids) is not None:
+            for frame, channel in heard:
+                vehicle = self.vehicles.find(*frame.ids)
+                if vehicle is not None and vehicle.claims.way is channel:
                     observer.on_frame(frame, now)
 
     # a turn
@@ -132,8 +134,6 @@ class MavlinkHardware:
         if self._waiting:
             self._take_waiting()
         self._read_at = now.mono
-        while hub.conflicts:
-            vehicles.conflict(hub.conflicts.pop(), now)
         vehicles.read(now)
         if vehicles.changed:
             vehicles.changed, self.changed = False, True
@@ -220,7 +220,7 @@ class LinkSource:
             hardware.vehicles.reconnected(self._hub.vehicles_on(self._endpoint), now.mono)
         take = hardware.vehicles.take
         for frame, channel in heard:
-            vehicle = take(frame, now)
+            vehicle = take(frame, now, channel)
             if vehicle is not None and vehicle.ids is not None:
                 self._hub.heard_vehicle(vehicle.ids, channel, now.mono)
         if hardware.observers:

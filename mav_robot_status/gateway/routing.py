@@ -152,6 +152,10 @@ class Router(Generic[C]):
             decision = self._decisions[key] = self._decide(came_from, frame.ids, target, self._heard, now - PRESENT)
         return decision
 
+    def decided(self, frame: Frame, came_from: C) -> tuple[C, ...]:
+        """The channels that `destinations` gave for this frame or an earlier one like it; none if it is forgotten."""
+        return self._decisions.get((came_from, frame.ids, _target(frame)), ())
+
     def _heartbeat(self, sender: tuple[int, int], came_from: C, now: float) -> tuple[C, ...]:
         """The channels that get a heartbeat. Decided each time: a decision of a second ago may be too old."""
         self.heard(came_from, *sender, now)

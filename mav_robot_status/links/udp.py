@@ -30,9 +30,12 @@ RESOLVE_WAIT = 0.2
 """Seconds that opening waits for a name, so that a name that resolves is ready for the first send."""
 RETRY = 0.2, 5.0
 """Seconds between attempts to resolve a name or to bind to a missing address: first, longest."""
+OTHER_SILENCE = 3.5
+"""Seconds of silence of the peer that answered, after which another address may answer: the heartbeat timeout."""
 ANSWER_SILENCE = 30.0
 """Seconds of silence of the peer that answered, after which the link broadcasts again."""
 
+EXACT = 2
 _MAX_DATAGRAM = 65535
 _SO_TIMESTAMPNS = 35
 _TIMESPEC = struct.Struct("@qq")
@@ -176,8 +179,10 @@ class UdpListener(UdpLink):
 
 
 class UdpSender(UdpLink):
-    """Kind `udpout`: sends to one peer and receives from every address.
+    """Kind `udpout`: sends to one peer, and receives from every address.
 
+    The owner tells which address answers with MAVLink. Only that one counts until it is silent, or until an address
+    that is nearer to the target answers: a router may answer from another port.
     A name that does not resolve yet is not an error; until it does, every send counts as dropped.
     """
 
@@ -191,6 +196,21 @@ class UdpSender(UdpLink):
             self._open(found[0])
         else:
             self._due = -math.inf
+
+    def may_answer(self, source: Address, current: Address, silent: float) -> bool:
+        """Whether this address may answer. `current` answered until `silent` seconds ago; None: nobody did yet."""
+        return current is None or silent > OTHER_SILENCE or self._nearness(source) > self._nearness(current)
+
+    def answered(self, source: Address) -> None:
+        """Note that this address answered with MAVLink. The log names it if it is not the target."""
+        if isinstance(source, tuple) and self._peer is not None and self._nearness(source) < EXACT:
+            log.info("%s: %s answers", self.text, host_port(*source[:2]))
+
+    def _nearness(self, source: Address) -> int:
+        """How much of the address of the target this one has: EXACT, its host, or nothing."""
+        if not isinstance(source, tuple) or self._peer is None or source[0] != self._peer[0]:
+            return 0
+        return EXACT if source[1] == self._peer[1] else 1
 
     def _open(self, target: Target) -> None:
         """Create the socket. It stays unconnected: the peer may answer from another address."""
@@ -220,10 +240,11 @@ class UdpBroadcaster(UdpSender):
     """Kind `udpbcast`: broadcasts until a peer answers, then sends to that peer until it falls silent."""
 
     _broadcast_address: SocketAddress | None = None
+    _answerer: SocketAddress | None = None
     _answered = False
 
     def receive(self, limit: int = 64) -> list[Received]:
-        """The datagrams that wait; the first sender becomes the peer."""
+        """The datagrams that wait."""
         pieces = super().receive(limit)
         self._hear(pieces)
         return pieces
@@ -235,13 +256,25 @@ class UdpBroadcaster(UdpSender):
         return pieces
 
     def _hear(self, pieces: Sequence[Received | Dated]) -> None:
-        if pieces and self._peer == self._broadcast_address:
-            peer: Any = pieces[0].source
+        if self._answerer is not None and any(piece.source == self._answerer for piece in pieces):
+            self._send_to(self._answerer)
+
+    def may_answer(self, source: Address, current: Address, silent: float) -> bool:
+        """Whether this address may answer: the first one, and another one after a silence."""
+        return current is None or silent > OTHER_SILENCE
+
+    def answered(self, source: Address) -> None:
+        """Send to this address from now on."""
+        if isinstance(source, tuple):
+            self._answerer = source
+            self._send_to(source)
+
+    def _send_to(self, peer: SocketAddress) -> None:
+        if self._peer != peer:
             self._peer = peer
             self._state_log.up(f"{self.text}: {host_port(*peer[:2])} answers, sending to it")
-        if any(piece.source == self._peer for piece in pieces):
-            self._answered = True
-            self._due = -math.inf
+        self._answered = True
+        self._due = -math.inf
 
     def _open(self, target: Target) -> None:
         super()._open(target)

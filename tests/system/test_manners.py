@@ -150,7 +150,8 @@ def test_one_vehicle_on_two_links_is_one_vehicle_and_either_link_may_fail(
         send(armed, wires)
     assert {line.status["handle"] for line in gate.lines} == {"industrial_robot_status_handle"}
     assert not any(line.status["link"]["state"] == "LOST" for line in gate.lines)
-    states = [line.status["drives_powered"] for line in gate.lines]
+    # while one link says armed and the other one, silent for less than 1.5 s, disarmed: unknown
+    states = [s for line in gate.lines if (s := line.status["drives_powered"]) is not None]
     assert [s for n, s in enumerate(states) if n == 0 or s != states[n - 1]] == [False, True, False, True]
     assert not any(line.status["in_error"] for line in gate.lines)
     assert gate.stop() == 0

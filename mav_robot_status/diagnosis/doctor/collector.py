@@ -6,8 +6,9 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from ...gateway.observer import Observer
-from ...gateway.path_selection import APART, CLOCKS
 from ...hardware.mavlink.identity import is_autopilot, named
+from ...hardware.mavlink.state.boot_clock import APART
+from ...hardware.mavlink.state.claims import CLOCKS
 from ...mavlink import definitions as mav
 from ...mavlink.applet import stop_report
 from ...mavlink.counters import Counters

@@ -14,16 +14,18 @@ from ...interface.status import Detail, LinkState, RobotStatus, Vehicle
 from ...mavlink.definitions import AUTOPILOT_NAMES, STATE_NAMES, TYPE_NAMES
 from . import causes
 from .identity import named
+from .rules.claimed import agreed
 from .rules.drives_powered import drives_powered, motion_possible
 from .rules.e_stopped import e_stopped
 from .rules.errors import active_errors, in_error
 from .rules.flight_mode import flight_mode
 from .rules.in_motion import in_motion
 from .rules.inhibits import inhibit, inhibits
-from .rules.reason import TRUE, Reason, Source
+from .rules.reason import FALSE, TRUE, Reason, Source
 
 if TYPE_CHECKING:
     from ...clock import Instant
+    from .autopilots.modes import FlightMode
     from .facts import Facts
     from .options import HardwareOptions
 
@@ -48,6 +50,12 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
     drives, why_drives = drives_powered(facts, options, stopped, why_stopped)
     possible, why_possible = motion_possible(facts, options, mode, drives, why_drives)
     moving, why_moving = in_motion(facts, options)
+    why_mode, doubted = Reason(mode.rule, Source.MODE_NUMBER), facts.claimed.doubted
+    if doubted:
+        known = agreed(facts.claimed, mode.mode, drives)
+        mode, why_mode = mode._replace(mode=known.mode[0]), known.mode[1]
+        (stopped, why_stopped), (drives, why_drives) = known.e_stopped, known.drives_powered
+        (possible, why_possible), (moving, why_moving) = known.motion_possible, known.in_motion
     errors = active_errors(facts)
     wrong, why_wrong = in_error(facts, errors)
     status = RobotStatus(
@@ -63,16 +71,14 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
         system=ids[0],
         component=ids[1],
         errors=tuple(error.cause for error in errors),
-        inhibits=() if possible is TRUE else inhibits(facts, options, mode, (stopped, why_stopped), before, now),
-        vehicle=_vehicle(facts)._replace(
-            flight_mode=mode.name,
-            custom_mode=facts.heartbeat.custom_mode,
-            state=named(STATE_NAMES, facts.heartbeat.system_status),
-        ),
+        inhibits=()
+        if possible is TRUE or (doubted and possible is not FALSE)
+        else inhibits(facts, options, mode, (stopped, why_stopped), before, now),
+        vehicle=_vehicle(facts) if doubted and not facts.claimed.one_mode else _running(facts, mode),
         link=LinkState.CONNECTED,
     )
     reasons = {
-        "mode": Reason(mode.rule, Source.MODE_NUMBER),
+        "mode": why_mode,
         "e_stopped": why_stopped,
         "drives_powered": why_drives,
         "motion_possible": why_possible,
@@ -106,4 +112,13 @@ def _vehicle(facts: Facts) -> Vehicle:
         autopilot=named(AUTOPILOT_NAMES, kind.autopilot),
         type=named(TYPE_NAMES, kind.vehicle_type),
         firmware=None if kind.firmware is None else str(kind.firmware),
+    )
+
+
+def _running(facts: Facts, mode: FlightMode) -> Vehicle:
+    """The whole of it while the link is connected."""
+    return _vehicle(facts)._replace(
+        flight_mode=mode.name,
+        custom_mode=facts.heartbeat.custom_mode,
+        state=named(STATE_NAMES, facts.heartbeat.system_status),
     )

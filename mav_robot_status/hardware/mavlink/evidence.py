@@ -127,6 +127,13 @@ def _latch(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     return (None, None) if latch is None else (latch.source, latch.last)
 
 
+def _claims(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    claims = state.claims
+    if claims.conflict is not None:
+        return claims.conflict.why, claims.conflict.last
+    return "HEARTBEAT.base_mode of another sender", max((claim.at for claim in claims.others.values()), default=None)
+
+
 def _esc(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     return "ESC telemetry: rpm", _at(state.latest.esc)
 
@@ -180,6 +187,7 @@ SHOW: Final[dict[Source, Show]] = {
     Source.APPLET_AND_OUTPUTS: _applet_and_outputs,
     Source.RC_CHANNELS: _rc_channels,
     Source.LATCH: _latch,
+    Source.CLAIMS: _claims,
     Source.ESC: _esc,
     Source.OUTPUTS: _outputs,
     Source.LANDED_STATE: _landed_state,

@@ -131,6 +131,18 @@ class SensorFault(NamedTuple):
     since_us: int
 
 
+class Claimed(NamedTuple):
+    """Whether another sender claims the ids of the vehicle, and on what all agree."""
+
+    conflict_since: int | None
+    """Unix microseconds. None: no conflict."""
+    doubted: bool
+    """Whether mode, power, motion and e-stop are unknown unless all agree."""
+    all_armed: bool
+    all_disarmed: bool
+    one_mode: bool
+
+
 class Explained(NamedTuple):
     """The text that the autopilot sent."""
 
@@ -174,6 +186,7 @@ class Facts(NamedTuple):
     latched: Latched
     explained: Explained
     mode_hints: ModeHints
+    claimed: Claimed
     text_overdue: bool
     """Whether the missing chunks of a text are overdue."""
 

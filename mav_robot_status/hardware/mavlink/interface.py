@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ...interface import DEFAULT_HANDLE_NAME, Detail, LinkState, RobotHW, RobotStatus
 from ...mavlink import definitions as mav
-from .causes import SYSTEM_ID_CONFLICT
+from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
 from .derive import derive
 from .evidence import EvidenceOfVehicle
 from .handlers import overheard, pass_time
+from .handlers.heartbeat import LONG_LOSS
 from .identity import is_autopilot, named
 from .message_table import APPLET_ID, COMMAND_IDS, HEARTBEAT_ID, KINDS
 from .moment import Moment
@@ -22,9 +23,10 @@ from .newcomers import Newcomers
 from .options import HardwareOptions
 from .requests.scheduler import Ask, RequestScheduler
 from .rules.inhibits import inhibit
-from .settle import facts_of
-from .state import latches, motion
+from .settle import claimed, facts_of
+from .state import motion
 from .state.applet import is_word
+from .state.claims import CLOCKS, CONTINUES, Claims, Outcome
 from .state.latest_messages import SILENCE
 from .state.vehicle_state import begin
 from .vehicle import ExpectedVehicle, TrackedVehicle
@@ -40,21 +42,29 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MOST_VEHICLES: Final = 256
-ESTABLISHED: Final = 10.0
+ESTABLISHED: Final = 5.0
 """Seconds of heartbeats without a link loss after which a vehicle keeps its place and its handle."""
 LOGGED: Final = 5
 """The most ids in one log line."""
 GONE: Final = 10.0
 """Seconds after its link loss for which another vehicle keeps them: a few heartbeats may be forged, or a mistake."""
+LOG_WAYS: Final = 10.0
+"""Seconds between two log lines about the way of one vehicle."""
 
 
 class MavlinkRobotHW(RobotHW):
     """The vehicles heard on MAVLink links, as handles."""
 
     def __init__(
-        self, options: HardwareOptions | None = None, slots: Sequence[ExpectedVehicle] = (), own_component: int = 192
+        self,
+        options: HardwareOptions | None = None,
+        slots: Sequence[ExpectedVehicle] = (),
+        own_component: int = 192,
+        claims: dict[tuple[int, int], Claims[Any]] | None = None,
     ) -> None:
+        """`claims`: who speaks with the ids of each vehicle. Another part may look at it."""
         super().__init__()
+        self.claims = {} if claims is None else claims
         self.options = options or HardwareOptions()
         self._asking = RequestScheduler(self.options.watch_outputs, own_component)
         # exact ids match before open ones
@@ -96,9 +106,12 @@ class MavlinkRobotHW(RobotHW):
         """Our ids, to which acknowledgements are addressed. `system` None: the system id of the vehicle."""
         self._asking.own_system, self._asking.own_component = system, component
 
-    def take(self, frame: Values, now: Instant) -> TrackedVehicle | None:
-        """Process one frame. Returns the vehicle if the frame is a heartbeat of its autopilot, else None."""
-        message_id, ids, _, message, _, _ = frame
+    def take(self, frame: Values, now: Instant, way: Any = None) -> TrackedVehicle | None:
+        """Process one frame that arrived on `way`: a channel, or None if there is only one.
+
+        Returns the vehicle if the frame is a heartbeat of its autopilot on its selected way, else None.
+        """
+        message_id, ids, sequence, message, _, _ = frame
         try:
             handler, settles = KINDS[message_id]
         except KeyError:
@@ -106,9 +119,18 @@ class MavlinkRobotHW(RobotHW):
                 self._overhear(message, ids, now)
             return None
         tracked = self._tracked.get(ids)
+        if tracked is not None:
+            claims = tracked.claims
+            if claims.way is not way:
+                if not self._is_heard_elsewhere(tracked, frame, now, way):
+                    return None
+            else:
+                if (sequence - claims.sequence) & 255 > CONTINUES:
+                    claims.broken = True
+                claims.sequence = sequence
         sender = None
         if message_id == HEARTBEAT_ID:
-            tracked = sender = self._vehicle_of(tracked, message, ids, now)
+            tracked = sender = self._vehicle_of(tracked, frame, now, way)
         if tracked is None:
             if message_id == APPLET_ID and is_word(message):
                 self.ignored_words += 1
@@ -116,7 +138,7 @@ class MavlinkRobotHW(RobotHW):
         state = tracked.state
         if state is None:
             if sender is not None:
-                tracked.state = begin(message, now)
+                tracked.state = begin(message, now, tracked.claims)
                 self._mark_dirty(tracked)
             return sender
         if tracked.requests is not None and sender is None:
@@ -184,14 +206,6 @@ class MavlinkRobotHW(RobotHW):
         """What vehicles were asked for and have not sent yet, one line for each vehicle that still may send it."""
         return [line for tracked in self._tracked.values() if (line := self._asking.waits_for(tracked)) is not None]
 
-    def conflict(self, ids: tuple[int, int], now: Instant) -> None:
-        """Report that two autopilots use the ids of this vehicle, on different paths."""
-        tracked = self._tracked.get(ids)
-        if tracked is not None and tracked.state is not None:
-            state = tracked.state
-            state.latches = latches.announce(state.latches, SYSTEM_ID_CONFLICT, None, now, "clocks of two autopilots")
-            self._mark_dirty(tracked)
-
     def next_due(self, until: float = -math.inf) -> float:
         """When (monotonic seconds) `read` or `due_requests` has work. -inf: now, because of a frame.
 
@@ -229,9 +243,8 @@ class MavlinkRobotHW(RobotHW):
         Vehicles with the ids `keep` keep their state.
         """
         for tracked in self._tracked.values():
-            if tracked.ids in keep:
-                continue
-            _make_unheard(tracked)
+            if tracked.ids not in keep:
+                _make_unheard(tracked)
         self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked.dirty]
         self._find_deadline()
         self._unheard = True
@@ -256,22 +269,27 @@ class MavlinkRobotHW(RobotHW):
                     self._mark_dirty(tracked)
 
     def _vehicle_of(
-        self, tracked: TrackedVehicle | None, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant
+        self, tracked: TrackedVehicle | None, frame: Values, now: Instant, way: Any
     ) -> TrackedVehicle | None:
         """The vehicle whose autopilot sent this heartbeat; None if it is not from an autopilot."""
-        if tracked is None:
-            tracked = self._discover(heartbeat, ids, now)
-        elif not is_autopilot(heartbeat, ids[1]):
-            return None
-        if tracked is not None:
-            tracked.handle.heard_at = now.mono
-        return tracked
-
-    def _discover(self, heartbeat: mav.Heartbeat, ids: tuple[int, int], now: Instant) -> TrackedVehicle | None:
-        """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
+        _, ids, sequence, heartbeat, _, _ = frame
         if not is_autopilot(heartbeat, ids[1]):
             return None
+        if tracked is None:
+            tracked = self._discover(frame, now, way)
+        if tracked is not None:
+            tracked.handle.heard_at = now.mono
+            claims = tracked.claims
+            claims.heard(heartbeat, sequence, way, now)
+            if claims.news is not None:
+                self._log_conflict(tracked)
+        return tracked
+
+    def _discover(self, frame: Values, now: Instant, way: Any) -> TrackedVehicle | None:
+        """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
+        _, ids, _, heartbeat, _, _ = frame
         tracked = self._place(ids) if self._has_place(ids, now.mono) else None
+        tracked = tracked or self._succeed(frame, now, way)
         if tracked is None:
             self.ignored += 1
             return None
@@ -319,6 +337,7 @@ class MavlinkRobotHW(RobotHW):
         for tracked in gone:
             assert tracked.ids is not None
             del self._tracked[tracked.ids]
+            self.claims.pop(tracked.ids, None)
             _make_unheard(tracked)
             if tracked in self._expected:
                 tracked.ids = None
@@ -331,6 +350,85 @@ class MavlinkRobotHW(RobotHW):
         self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked not in gone]
         self._find_deadline()
 
+    def _succeed(self, frame: Values, now: Instant, way: Any) -> TrackedVehicle | None:
+        """The vehicle whose entry leaves the ids open, if this sender takes it over from the one before.
+
+        Component 1 is the autopilot: it takes the entry at once from another component of its system, and what that one
+        says stays a claim. Any other sender takes it only after a long silence. Until then it is a claim itself.
+        """
+        _, ids, sequence, heartbeat, _, _ = frame
+        for tracked in self._expected:
+            owner = tracked.ids
+            if owner is None or tracked.slot.component is not None or tracked.slot.system not in (None, ids[0]):
+                continue
+            same_system = owner[0] == ids[0]
+            better = same_system and ids[1] == MAV_COMP_ID_AUTOPILOT1
+            heard_at = tracked.handle.heard_at
+            if better or heard_at is None or now.mono - heard_at > LONG_LOSS:
+                log.info("vehicle %d.%d: its handle '%s' is now that of %d.%d", *owner, tracked.handle.name, *ids)
+                former = tracked.claims.mine
+                _make_unheard(tracked)
+                tracked.requests = tracked.parameters = None
+                del self._tracked[owner]
+                self.claims.pop(owner, None)
+                self._give(tracked, ids)
+                if former is not None and same_system:
+                    tracked.claims.others[owner] = former
+                return tracked
+            if same_system:
+                tracked.claims.claim(ids, way, heartbeat, sequence, now)
+                self._settle_claims(tracked, now)
+        return None
+
+    def _is_heard_elsewhere(self, tracked: TrackedVehicle, frame: Values, now: Instant, way: Any) -> bool:
+        """Whether a frame counts that is not from the selected way: a heartbeat that selects its way."""
+        message_id, ids, sequence, message, _, _ = frame
+        claims, state = tracked.claims, tracked.state
+        if claims.mine is None:
+            return True
+        claims.follow(way, sequence)
+        booted = state.boot.at if state is not None and state.boot.clock_ms is not None else None
+        if message_id == HEARTBEAT_ID and is_autopilot(message, ids[1]):
+            before = claims.way
+            outcome = claims.elsewhere(message, sequence, way, now, booted, self.options.heartbeat_timeout)
+            if outcome is not Outcome.UNUSED:
+                if outcome is Outcome.EXCHANGED:
+                    log.warning("vehicle %d.%d: another vehicle has these ids now, on %s", *ids, way)
+                    tracked.state, tracked.boots = None, 0
+                    tracked.requests = tracked.parameters = None
+                elif now.mono >= tracked.log_way_at:
+                    log.info("vehicle %d.%d: now heard on %s, no longer on %s", *ids, way, before)
+                tracked.log_way_at = now.mono + LOG_WAYS
+                return True
+        elif message_id in CLOCKS:
+            claims.clock(way, now.mono - message.time_boot_ms / 1000, booted, now)
+        else:
+            return False
+        self._settle_claims(tracked, now)
+        return False
+
+    def _settle_claims(self, tracked: TrackedVehicle, now: Instant) -> None:
+        """After a message of another sender."""
+        self._log_conflict(tracked)
+        state = tracked.state
+        if state is None or tracked.dirty or not tracked.facts:
+            return
+        moment = tracked.moment
+        moment.now = now.mono
+        if claimed(state, moment, self.options) != tracked.facts.claimed:
+            self._mark_dirty(tracked)
+        elif moment.next < self.deadline:
+            self.deadline = moment.next
+
+    def _log_conflict(self, tracked: TrackedVehicle) -> None:
+        """Log once that a conflict has begun."""
+        found, tracked.claims.news = tracked.claims.news, None
+        if found is None:
+            return
+        ways = [str(way) for way in dict.fromkeys(found.ways) if way is not None]
+        places = f": {' and '.join(ways)}" if ways else ""
+        log.warning("two autopilots claim the ids %d.%d%s (%s)", *(tracked.ids or (0, 0)), places, found.why)
+
     def _place(self, ids: tuple[int, int], name: str | None = None) -> TrackedVehicle | None:
         """A new vehicle with these ids; None if no entry matches. `name` is the name of its handle if that is new."""
         tracked = next((t for t in self._expected if t.matches(*ids)), None)
@@ -340,9 +438,14 @@ class MavlinkRobotHW(RobotHW):
             tracked = TrackedVehicle(ExpectedVehicle(*ids, name))
             self.handles.register_handle(tracked.handle)
         if tracked is not None:
-            tracked.ids = ids
-            self._tracked[ids] = tracked
+            self._give(tracked, ids)
         return tracked
+
+    def _give(self, tracked: TrackedVehicle, ids: tuple[int, int]) -> None:
+        """These ids to a vehicle."""
+        tracked.ids = ids
+        tracked.claims = self.claims.setdefault(ids, tracked.claims)
+        self._tracked[ids] = tracked
 
     def _mark_dirty(self, tracked: TrackedVehicle) -> None:
         """Make a `read` due at once, to evaluate this vehicle. Until then its messages settle no facts."""
@@ -456,6 +559,7 @@ def _make_unheard(tracked: TrackedVehicle) -> None:
     tracked.boots = 0
     tracked.established = False
     tracked.dirty, tracked.moment = False, Moment(-math.inf)
+    tracked.claims.forget()
     system, component = tracked.ids or (None, None)
     tracked.handle.status = RobotStatus()
     tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)

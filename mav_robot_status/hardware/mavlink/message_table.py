@@ -34,7 +34,7 @@ MOVES: Final[dict[type, tuple[str, ...]]] = {
     mav.ExtendedSysState: ("landed_state", "has_no_lift"),
     mav.GlobalPositionInt: ("movement",),
     mav.GpsRawInt: ("receiver_stands",),
-    mav.Heartbeat: ("latched", "stop"),
+    mav.Heartbeat: ("claimed", "latched", "stop"),
     mav.MessageInterval: (),
     mav.LocalPositionNed: ("movement",),
     mav.MissionCurrent: (),  # read with the next SYS_STATUS

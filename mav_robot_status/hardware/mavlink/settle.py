@@ -15,6 +15,7 @@ from .autopilots.sensor_weights import SOFT
 from .facts import (
     Applet,
     Cause,
+    Claimed,
     Explained,
     Facts,
     Fresh,
@@ -30,6 +31,7 @@ from .identity import AIRCRAFT, IN_THE_AIR
 from .state import applet as applets
 from .state import estop, latches, outputs, sensors, text_assembly
 from .state.boot_clock import GRACE
+from .state.claims import HOLD, LIVE, NEVER
 from .state.estimator import denied_until
 from .state.latest_messages import FRESH
 from .state.motion import SUSTAIN_OFF, SUSTAIN_ON
@@ -60,6 +62,8 @@ NO_APPLET: Final = Applet(UNKNOWN, False, False)
 NO_SYS_STATUS: Final = SystemStatus(False, False, UNKNOWN, None, False)
 NOTHING_LATCHED: Final = Latched((), False, False)
 NO_HINTS: Final = ModeHints()
+UNDISPUTED: Final = Claimed(None, False, False, False, False)
+DOUBTED: Final = UNDISPUTED._replace(doubted=True)
 
 
 def kind(state: VehicleState, moment: Moment, options: HardwareOptions) -> Kind:
@@ -288,6 +292,28 @@ def mode_hints(state: VehicleState, moment: Moment, options: HardwareOptions) ->
     return ModeHints(state.modes.get(number), standard_mode)
 
 
+def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Claimed:
+    """Whether another sender claims the ids. Disarmed is doubtful while any live claim is armed."""
+    claims = state.claims
+    conflict = claims.conflict
+    mine = claims.mine
+    if conflict is None and not claims.others and (mine is None or mine.doubt_at == NEVER):
+        return UNDISPUTED
+    if conflict is not None and not moment.has_come(conflict.last + HOLD):
+        since = conflict.since.unix_us
+        armed = state.heartbeats.armed
+        all_armed = armed and moment.has_come(claims.disarmed_at + HOLD)
+        all_disarmed = not armed and moment.has_come(claims.armed_at + HOLD)
+        one_mode = moment.has_come(claims.differed_at + HOLD)
+        return new(Claimed, (since, True, all_armed, all_disarmed, one_mode))
+    if not state.heartbeats.armed and (
+        (mine is not None and not moment.has_come(mine.doubt_at + LIVE))
+        or any(not moment.has_come(c.doubt_at + LIVE) for c in claims.others.values())
+    ):
+        return DOUBTED
+    return UNDISPUTED
+
+
 def text_overdue(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
     """Whether the missing chunks of a text are overdue."""
     return any(moment.has_come(partial.at + text_assembly.PATIENCE) for _, partial in state.texts)
@@ -318,6 +344,7 @@ SETTLE: Final[dict[str, Settle]] = {
     "latched": latched,
     "explained": explained,
     "mode_hints": mode_hints,
+    "claimed": claimed,
     "text_overdue": text_overdue,
 }
 """The function that settles each fact, in the order of `Facts`."""

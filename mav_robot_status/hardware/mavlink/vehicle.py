@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...interface import DEFAULT_HANDLE_NAME, Detail, IndustrialRobotStatusHandle, LinkState
 from .moment import Moment
+from .state.claims import Claims
 
 if TYPE_CHECKING:
     from .facts import Facts
@@ -28,11 +29,13 @@ class TrackedVehicle:
 
     __slots__ = (
         "boots",
+        "claims",
         "dirty",
         "established",
         "facts",
         "handle",
         "ids",
+        "log_way_at",
         "losses",
         "moment",
         "parameters",
@@ -47,6 +50,8 @@ class TrackedVehicle:
         self.handle.detail = Detail(slot.system, slot.component, link=LinkState.NEVER_SEEN)
         self.ids: tuple[int, int] | None = None
         self.state: VehicleState | None = None
+        self.claims: Claims[Any] = Claims()
+        """Who speaks with its ids."""
         self.requests: Requests | None = None
         self.parameters: Parameters | None = None
         self.boots = 0
@@ -54,6 +59,8 @@ class TrackedVehicle:
         """Whether its heartbeats arrived for a while. Otherwise its place is free again soon after it falls silent."""
         self.losses = 0
         """How often the link was lost."""
+        self.log_way_at = -math.inf
+        """When a change of its way may be logged again."""
         self.facts: Facts | tuple[()] = ()
         """The facts that the status in the handle is derived from."""
         self.dirty = False

@@ -3,15 +3,23 @@ from __future__ import annotations
 import contextlib
 import socket
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from mav_robot_status.config import LinkConfig
-from mav_robot_status.gateway.endpoint import MOST_PEERS, MOST_SOURCES, PEER_SILENCE, Endpoint
+from mav_robot_status.gateway.endpoint import MOST_PEERS, MOST_SOURCES, PEER_SILENCE, Channel, Endpoint
 from mav_robot_status.mavlink.definitions import Heartbeat, NamedValueInt
 from mav_robot_status.mavlink.encode import encode
 
 HEARTBEAT = encode(Heartbeat(0, 10, 3, 65, 4, 3), system=1, component=1, sequence=0)
+
+
+def admitted(endpoint: Endpoint, source: Any, now: float = 0.0) -> Channel:
+    """The channel of an address that has sent a valid frame."""
+    channel = endpoint.channel(source, now) or endpoint.hear_stranger(HEARTBEAT, source, now)[0]
+    assert channel is not None
+    return channel
 
 
 @pytest.fixture
@@ -30,38 +38,94 @@ def peer() -> Iterator[socket.socket]:
 
 
 def test_a_split_frame_is_reassembled_for_each_sender(endpoint: Endpoint) -> None:
-    for source in ("a", "b"):
-        assert endpoint.channel(source).parser.feed(HEARTBEAT[:9]) == []
-    for source in ("a", "b"):
-        assert len(endpoint.channel(source).parser.feed(HEARTBEAT[9:])) == 1
-    assert endpoint.totals().frames == 2
+    channels = [admitted(endpoint, source) for source in ("a", "b")]
+    for channel in channels:
+        assert channel.parser.feed(HEARTBEAT[:9]) == []
+    for channel in channels:
+        assert len(channel.parser.feed(HEARTBEAT[9:])) == 1
+    assert endpoint.totals().frames == 4
+
+
+def test_a_lone_sender_that_splits_its_first_frame_gets_a_channel(endpoint: Endpoint) -> None:
+    for byte in HEARTBEAT[:-1]:
+        assert endpoint.hear_stranger(bytes((byte,)), "bytewise", 0.0) == (None, [])
+    channel, frames = endpoint.hear_stranger(HEARTBEAT[-1:], "bytewise", 0.0)
+    assert channel is not None
+    assert endpoint.channel("bytewise", 0.0) is channel
+    assert len(frames) == 1
+
+
+def test_bytes_of_two_strangers_make_no_frame(endpoint: Endpoint) -> None:
+    assert endpoint.hear_stranger(HEARTBEAT[:9], "a", 0.0) == (None, [])
+    assert endpoint.hear_stranger(HEARTBEAT[9:], "b", 0.0) == (None, [])
+
+
+def test_datagrams_without_a_valid_frame_make_no_channel_and_are_counted(endpoint: Endpoint) -> None:
+    for number in range(100):
+        assert endpoint.hear_stranger(b"x", number, 0.0) == (None, [])
+    assert list(endpoint.channels()) == []
+    assert endpoint.totals().garbage_bytes == 100
 
 
 def test_a_flood_of_senders_uses_a_bounded_number_of_parsers_and_all_are_counted(endpoint: Endpoint) -> None:
-    endpoint.channel("vehicle").parser.feed(HEARTBEAT[:9])
     for number in range(MOST_SOURCES * 5):
-        endpoint.channel(number).parser.feed(HEARTBEAT)
-        endpoint.channel("vehicle")  # active from time to time: it is kept
+        admitted(endpoint, number)
     assert len(list(endpoint.channels())) == MOST_SOURCES
-    assert len(endpoint.channel("vehicle").parser.feed(HEARTBEAT[9:])) == 1
-    assert endpoint.totals().frames == MOST_SOURCES * 5 + 1
+    assert endpoint.totals().frames == MOST_SOURCES * 5
+
+
+def test_a_flood_of_senders_does_not_end_the_channel_of_a_vehicle_that_speaks(endpoint: Endpoint) -> None:
+    vehicle = admitted(endpoint, "vehicle")
+    endpoint.heard(vehicle, 0.0)
+    for number in range(MOST_SOURCES * 5):
+        admitted(endpoint, number, 2.0)
+    assert endpoint.channel("vehicle", 2.0) is vehicle
+
+
+def test_vehicles_that_speak_keep_all_places_and_a_silent_newcomer_loses_its_place(endpoint: Endpoint) -> None:
+    for number in range(MOST_SOURCES):
+        endpoint.heard(admitted(endpoint, number), 0.0)
+    for second in range(1, 8):
+        for number in range(1, MOST_SOURCES):
+            endpoint.heard(admitted(endpoint, number, second), float(second))
+        assert endpoint.hear_stranger(HEARTBEAT, "new", second)[0] is None or second > 5
+    assert endpoint.channel("new", 7.0) is not None
+    assert endpoint.channel(0, 7.0) is None
 
 
 def test_a_reused_parser_keeps_no_bytes_of_its_previous_sender(endpoint: Endpoint) -> None:
     for number in range(MOST_SOURCES):
-        endpoint.channel(number).parser.feed(HEARTBEAT[:9])
-    assert endpoint.channel("new").parser.feed(HEARTBEAT[9:]) == []
-    assert len(endpoint.channel("new").parser.feed(HEARTBEAT)) == 1
+        admitted(endpoint, number).parser.feed(HEARTBEAT[:9])
+    admitted(endpoint, "new")  # the next stranger gets the parser of the first sender
+    assert endpoint.hear_stranger(HEARTBEAT[9:], "newer", 0.0) == (None, [])
+
+
+def test_a_silent_peer_gives_its_place_to_a_vehicle_that_speaks(endpoint: Endpoint) -> None:
+    for number in range(MOST_PEERS):
+        endpoint.heard(admitted(endpoint, number), 0.0)
+    vehicle = admitted(endpoint, "vehicle")
+    became = [second for second in range(20) if endpoint.heard(vehicle, float(second))]
+    assert len(became) == 1
+    assert became[0] < 15
+
+
+def test_a_peer_that_has_spoken_for_long_keeps_its_place_for_as_long(endpoint: Endpoint) -> None:
+    for second in range(21):
+        for number in range(MOST_PEERS):
+            endpoint.heard(admitted(endpoint, number), float(second))
+    vehicle = admitted(endpoint, "vehicle")
+    assert not endpoint.heard(vehicle, 39.0)
+    assert endpoint.heard(vehicle, 41.0)
 
 
 def test_the_first_eight_peers_are_kept(endpoint: Endpoint) -> None:
     for number in range(MOST_SOURCES):
-        endpoint.heard(endpoint.channel(number), 0.0)
+        endpoint.heard(admitted(endpoint, number), 0.0)
     assert [channel.source for channel in endpoint.peers()] == list(range(MOST_PEERS))
 
 
 def test_a_peer_and_its_requested_interval_are_forgotten_after_30_s_of_silence(endpoint: Endpoint) -> None:
-    old, young = endpoint.channel("old"), endpoint.channel("young")
+    old, young = admitted(endpoint, "old"), admitted(endpoint, "young")
     endpoint.heard(old, 0.0)
     old.interval = 0.2
     endpoint.heard(young, 1.0)
@@ -71,7 +135,7 @@ def test_a_peer_and_its_requested_interval_are_forgotten_after_30_s_of_silence(e
 
 
 def test_a_listening_endpoint_sends_to_the_address_of_a_channel(endpoint: Endpoint, peer: socket.socket) -> None:
-    channel = endpoint.channel(peer.getsockname())
+    channel = admitted(endpoint, peer.getsockname())
     assert not list(endpoint.peers())
     endpoint.heard(channel, 0.0)
     assert [c.send(b"one") for c in endpoint.peers()] == [True]
@@ -80,26 +144,45 @@ def test_a_listening_endpoint_sends_to_the_address_of_a_channel(endpoint: Endpoi
 
 
 def test_an_endpoint_that_sends_first_has_one_channel_whoever_answers(peer: socket.socket) -> None:
-    out = Endpoint(LinkConfig(f"udpout:127.0.0.1:{peer.getsockname()[1]}"), True)
+    port = peer.getsockname()[1]
+    out = Endpoint(LinkConfig(f"udpout:127.0.0.1:{port}"), True)
     with contextlib.closing(out.link):
-        answering = out.channel(("127.0.0.1", 9))
-        assert list(out.peers()) == [answering] == [out.channel(("127.0.0.1", 10))]
+        answering = admitted(out, ("127.0.0.1", port))
+        assert list(out.peers()) == [answering] == [out.channel(("127.0.0.1", port), 0.0)]
         assert answering.send(b"one")
         assert peer.recv(100) == b"one"
 
 
-def test_a_new_connection_does_not_continue_a_frame_of_the_previous_one(peer: socket.socket) -> None:
-    out = Endpoint(LinkConfig(f"udpout:127.0.0.1:{peer.getsockname()[1]}"))
+def test_after_an_answer_only_its_address_counts_until_it_is_silent(peer: socket.socket) -> None:
+    port = peer.getsockname()[1]
+    out = Endpoint(LinkConfig(f"udpout:127.0.0.1:{port}"))
+    stranger, router, target = ("10.9.9.9", 5), ("127.0.0.1", 5), ("127.0.0.1", port)
     with contextlib.closing(out.link):
-        assert out.channel(1).parser.feed(HEARTBEAT[:9]) == []
-        assert out.channel(2).parser.feed(HEARTBEAT[9:]) == []
-        assert len(out.channel(2).parser.feed(HEARTBEAT)) == 1
+        only = admitted(out, stranger)
+        for source in (router, target):  # each is nearer to the target than the one before
+            assert out.hear_stranger(b"no MAVLink", source, 1.0) == (None, [])
+            assert out.hear_stranger(HEARTBEAT, source, 1.0)[0] is only
+        for source in (router, stranger):
+            assert out.hear_stranger(HEARTBEAT, source, 4.0) == (None, [])
+        assert out.hear_stranger(HEARTBEAT, router, 5.0)[0] is only
+
+
+def test_a_new_connection_does_not_continue_a_frame_of_the_previous_one() -> None:
+    with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as server:
+        out = Endpoint(LinkConfig(f"tcp:127.0.0.1:{server.getsockname()[1]}"))
+        with contextlib.closing(out.link):
+            fed = []
+            for source, data in ((1, HEARTBEAT[:9]), (2, HEARTBEAT[9:]), (2, HEARTBEAT)):
+                channel = out.channel(source, 0.0)
+                assert channel is not None
+                fed.append(len(channel.parser.feed(data)))
+            assert fed == [0, 0, 1]
 
 
 def test_a_passive_endpoint_sends_nothing(peer: socket.socket) -> None:
     passive = Endpoint(LinkConfig("udpin:127.0.0.1:0", passive=True), False)
     with contextlib.closing(passive.link):
-        assert not passive.channel(peer.getsockname()).send(b"no")
+        assert not admitted(passive, peer.getsockname()).send(b"no")
         peer.setblocking(False)
         with pytest.raises(BlockingIOError):
             peer.recv(100)
@@ -107,15 +190,15 @@ def test_a_passive_endpoint_sends_nothing(peer: socket.socket) -> None:
 
 def test_a_link_that_starts_forwarding_keeps_its_counters_and_delivers_every_frame(endpoint: Endpoint) -> None:
     unwanted = encode(NamedValueInt(0, 7, b"RS_STATE"), system=1, component=1, sequence=0)
-    assert endpoint.channel("a").parser.feed(HEARTBEAT + unwanted)[1:] == []
+    assert admitted(endpoint, "a").parser.feed(HEARTBEAT + unwanted)[1:] == []
     endpoint.adjust(LinkConfig(endpoint.url), 3, keep_all=True)
-    assert len(endpoint.channel("a").parser.feed(HEARTBEAT + unwanted)) == 2
-    assert endpoint.totals().frames == 4
+    assert len(admitted(endpoint, "a").parser.feed(HEARTBEAT + unwanted)) == 2
+    assert endpoint.totals().frames == 5
     assert endpoint.number == 3
 
 
 def test_a_link_becomes_passive_and_keeps_its_peers(endpoint: Endpoint, peer: socket.socket) -> None:
-    channel = endpoint.channel(peer.getsockname())
+    channel = admitted(endpoint, peer.getsockname())
     endpoint.heard(channel, 0.0)
     endpoint.adjust(LinkConfig(endpoint.url, passive=True), 0)
     assert not channel.send(HEARTBEAT)

@@ -13,7 +13,7 @@ import pytest
 from mav_robot_status.errors import LinkError
 from mav_robot_status.links import open_link
 from mav_robot_status.links.base import Link, Received
-from mav_robot_status.links.udp import ANSWER_SILENCE, UdpLink
+from mav_robot_status.links.udp import ANSWER_SILENCE, UdpLink, UdpSender
 from mav_robot_status.links.url import parse
 
 from .conftest import Names
@@ -247,7 +247,11 @@ def test_a_broadcaster_sends_to_all_until_a_peer_answers(
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
         peer.settimeout(5)
         peer.sendto(b"I am", ("127.0.0.1", link.port))
-        assert [piece.data for piece in heard(link)] == [b"I am"]
+        (answer,) = heard(link)
+        assert answer.data == b"I am"
+        assert link.due() == math.inf  # no MAVLink yet
+        assert isinstance(link, UdpSender)
+        link.answered(answer.source)
         assert link.due() == -math.inf
         link.service(100.0)
         assert link.due() == 100.0 + ANSWER_SILENCE
@@ -277,7 +281,9 @@ def test_a_broadcaster_drops_a_silent_peer_although_others_send(open_: Open, cro
     peer, other = open_("udpin:127.0.0.1:0"), open_("udpin:127.0.0.1:0")
     assert link.send(b"who is there")
     peer.send(b"first", ("127.0.0.1", link.port))
-    assert len(heard(link)) == 1
+    (answer,) = heard(link)
+    assert isinstance(link, UdpSender)
+    link.answered(answer.source)
     link.service(100.0)
     other.send(b"second", ("127.0.0.1", link.port))
     assert len(heard(link)) == 1

@@ -33,8 +33,8 @@ LONGEST_START: Final = 10.0
 """Seconds from the first heartbeat to the text that ends the start."""
 TICKS: Final = 1.5
 """Seconds within which a clock counts as running."""
-TURN: Final = 10.0
-"""Seconds within which two autopilots with the same ids alternate."""
+BACK: Final = 10.0
+"""Seconds after the return of the link within which the clock shows whose it is."""
 
 
 def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: HardwareOptions) -> None:
@@ -84,12 +84,9 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
 
 
 def _another(state: VehicleState, message: Heartbeat, now: Instant) -> None:
-    """Another autopilot: the state of the old one is invalid. Two that alternate claim the same ids."""
-    new = begin(message, now)
-    new.boots, new.formerly = state.boots, (state.autopilot, state.vehicle_type)
-    if state.formerly == (message.autopilot, message.type) and now.mono - state.heartbeats.since.mono <= TURN:
-        kept = {code: latch for code, latch in state.latches.items() if code == causes.SYSTEM_ID_CONFLICT}
-        new.latches = latches.announce(kept, causes.SYSTEM_ID_CONFLICT, None, now, "HEARTBEAT.type and autopilot")
+    """Another autopilot: the state of the old one is invalid."""
+    new = begin(message, now, state.claims)
+    new.boots = state.boots
     state.become(new)
 
 
@@ -116,11 +113,33 @@ def _is_another_run(state: VehicleState, started: float) -> bool:
 
 
 def clock_changed(state: VehicleState, now: Instant) -> None:
-    """The clock gives another boot time: a small correction, which only matters for faults, or a reboot."""
-    if state.boot.rebooted:
-        rebooted(state, state.boot, now)
+    """The clock gives another boot time: a correction, which only matters for faults, a reboot, or two clocks."""
+    boot = state.boot
+    if boot.in_turn:
+        state.claims.contradict("time_boot_ms of two clocks in turn", state.claims.way, now)
+        state.latest.unsettled = True
+    if boot.rebooted:
+        rebooted(state, boot, now)
+    elif boot.ahead and _is_back(state, now.mono):
+        _exchanged(state, now)
     elif state.faults:
         state.latest.unsettled = True
+
+
+def _is_back(state: VehicleState, now: float) -> bool:
+    """Whether the link was lost, and came back not long ago."""
+    since = state.heartbeats.since.mono
+    return now - since <= BACK and state.heartbeats.runs[0].first < since
+
+
+def _exchanged(state: VehicleState, now: Instant) -> None:
+    """After a loss of the link the clock is far ahead: another vehicle, which has run for longer, has these ids now."""
+    beat = state.latest.heartbeat
+    assert beat is not None  # a state begins with a heartbeat
+    new = begin(beat.message, now, state.claims)
+    new.boot, new.boots, new.heartbeats = state.boot, state.boots + 1, state.heartbeats
+    new.latest.heartbeat = beat
+    state.become(new)
 
 
 def rebooted(state: VehicleState, boot: boot_rules.BootClock, now: Instant) -> None:
@@ -140,13 +159,10 @@ def rebooted(state: VehicleState, boot: boot_rules.BootClock, now: Instant) -> N
         firmware=state.firmware if state.firmware is not None and state.firmware.at > boot.at else None,
         asked=state.asked,
         boots=state.boots + 1,
-        formerly=state.formerly,
+        claims=state.claims,
     )
-    if boot.in_turn:
-        new.latches = latches.announce(
-            new.latches, causes.SYSTEM_ID_CONFLICT, None, now, "time_boot_ms of two clocks in turn"
-        )
-    elif causes.REBOOT_WHILE_ARMED in state.latches or armed_before(state.heartbeats, boot.at, LONG_LOSS):
+    armed = causes.REBOOT_WHILE_ARMED in state.latches or armed_before(state.heartbeats, boot.at, LONG_LOSS)
+    if armed and not boot.in_turn:
         new.latches = latches.announce(new.latches, causes.REBOOT_WHILE_ARMED, None, now, "time_boot_ms")
     state.become(new)
 

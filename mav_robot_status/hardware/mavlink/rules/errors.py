@@ -37,6 +37,8 @@ def _error(code: int, text: str | None, since_us: int, source: Source, later: in
 
 
 def _announced(facts: Facts) -> Iterator[Error]:
+    if facts.claimed.conflict_since is not None:
+        yield _error(causes.SYSTEM_ID_CONFLICT, None, facts.claimed.conflict_since, Source.CLAIMS)
     for code, text, since_us in facts.latched.causes:
         yield _error(code, text, since_us, Source.LATCH)
 

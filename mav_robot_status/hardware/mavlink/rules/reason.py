@@ -32,6 +32,7 @@ class Source(Enum):
     APPLET_AND_OUTPUTS = "RS_STOP against SERVO_OUTPUT_RAW"
     RC_CHANNELS = "RC_CHANNELS, with RCn_OPTION"
     LATCH = "what announced a cause"
+    CLAIMS = "what the senders with these ids say"
     ESC = "ESC telemetry"
     OUTPUTS = "SERVO_OUTPUT_RAW"
     LANDED_STATE = "EXTENDED_SYS_STATE"

@@ -14,8 +14,10 @@ STEP_BACK_MS: Final = 2000
 STEP_BACK: Final = STEP_BACK_MS / 1000  # seconds
 WRAP: Final = 1 << 32  # of a clock of 32 bits, after 49 days
 HALF: Final = WRAP // 2
-LATEST: Final = 15.0
-"""Seconds by which packets are repeated at most. A clock that is farther behind is that of another autopilot."""
+APART: Final = 10.0
+"""A link delays and repeats packets by fewer seconds. Clocks that differ by more are two."""
+REFUTED: Final = 3
+"""Steps back that were not confirmed, each within APART seconds of the last, which repeated packets do not explain."""
 DRIFT: Final = 0.05
 """The error of a clock, as a part of its time, at most STEP_BACK: a simulation may run slower than its clock."""
 GRACE: Final = 10.0
@@ -36,7 +38,13 @@ class BootClock:
     rebooted: bool = False
     """Whether the latest change is a reboot."""
     in_turn: bool = False
-    """Whether the clock returned to an earlier boot time after another one: two autopilots alternate."""
+    """Whether the latest change shows two autopilots that alternate: a return to an earlier boot time."""
+    ahead: bool = False
+    """Whether the latest change is a jump ahead, by more than a slow link delays."""
+    refuted: int = 0
+    """Steps back in a row by more than APART that the next sample refuted."""
+    refuted_at: float = 0.0
+    """When the latest of them was refuted, monotonic seconds."""
 
 
 def heard_clock(boot: BootClock, time_boot_ms: int, now: float) -> bool:
@@ -46,10 +54,12 @@ def heard_clock(boot: BootClock, time_boot_ms: int, now: float) -> bool:
     if clock_ms is None or clock_ms < time_boot_ms < clock_ms + HALF or time_boot_ms < clock_ms - HALF:  # it wraps
         # transport only delays samples, so the earliest boot time is the most accurate
         boot.clock_ms = time_boot_ms
+        refutes = boot.doubt_ms is not None and clock_ms is not None and _refutes(boot, clock_ms, now)
         boot.doubt_ms = None
-        if clock_ms is not None and 0 <= booted - boot.at < STEP_BACK:
+        if clock_ms is not None and 0 <= booted - boot.at < STEP_BACK and not refutes:
             return False
-        boot.at, boot.rebooted = booted, False
+        boot.ahead = clock_ms is not None and boot.at - booted > APART
+        boot.at, boot.rebooted, boot.in_turn = min(booted, boot.at) if refutes else booted, False, refutes
         return True
     if (clock_ms - time_boot_ms) % WRAP <= STEP_BACK_MS:
         boot.doubt_ms = None
@@ -62,7 +72,7 @@ def heard_clock(boot: BootClock, time_boot_ms: int, now: float) -> bool:
         return False
     boot.in_turn = boot.shown is not None and abs(booted - boot.shown) < STEP_BACK_MS / 1000
     boot.at, boot.clock_ms, boot.doubt_ms, boot.shown = booted, time_boot_ms, None, booted
-    boot.rebooted = True
+    boot.rebooted, boot.ahead = True, False
     return True
 
 
@@ -72,4 +82,14 @@ def _is_repeated(boot: BootClock, clock_ms: int, booted: float) -> bool:
     The last sample was sent at `clock_ms` after the boot of this run, whenever it arrived.
     """
     run = clock_ms / 1000
-    return booted - boot.at < min(run - min(STEP_BACK, DRIFT * run), LATEST)
+    return booted - boot.at < min(run - min(STEP_BACK, DRIFT * run), APART)
+
+
+def _refutes(boot: BootClock, clock_ms: int, now: float) -> bool:
+    """Note that a step back was not confirmed. True if that repeats: two clocks alternate sample by sample."""
+    assert boot.doubt_ms is not None
+    if (clock_ms - boot.doubt_ms) % WRAP <= APART * 1000:
+        return False
+    boot.refuted = boot.refuted + 1 if now - boot.refuted_at <= APART else 1
+    boot.refuted_at = now
+    return boot.refuted >= REFUTED

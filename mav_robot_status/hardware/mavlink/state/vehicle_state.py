@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ....clock import Instant
 from ....mavlink.enumerations import MAV_VTOL_STATE_UNDEFINED
@@ -17,6 +17,7 @@ from ..autopilots import announced_as
 from ..identity import Family, family_of, sensor_name
 from . import estop, latches, outputs, pending_command, sensors, text_assembly
 from .boot_clock import BootClock
+from .claims import Claims
 from .heartbeat_history import HeartbeatHistory, first_heartbeat
 from .latest_messages import LatestMessages, heard
 from .motion import Motion
@@ -113,8 +114,8 @@ class VehicleState:
     """Reboots seen."""
     started_at: float | None = None
     """When the autopilot sent a text that it sends only while it starts, since the last heartbeat."""
-    formerly: tuple[int, int] | None = None
-    """The autopilot and vehicle type that used these ids before."""
+    claims: Claims[Any] = field(default_factory=Claims, compare=False)
+    """Who speaks with its ids. It outlives reboots, and the vehicle itself."""
 
     profile: Autopilot = field(init=False)
     """The meaning of its messages."""
@@ -154,7 +155,7 @@ class VehicleState:
         self.latest.unsettled = True
 
 
-def begin(heartbeat: Heartbeat, now: Instant) -> VehicleState:
+def begin(heartbeat: Heartbeat, now: Instant, claims: Claims[Any] | None = None) -> VehicleState:
     """The state of a vehicle at its first heartbeat."""
     latest = LatestMessages()
     latest.heartbeat = heard(latest, heartbeat, now.mono, None)
@@ -164,6 +165,7 @@ def begin(heartbeat: Heartbeat, now: Instant) -> VehicleState:
         boot=BootClock(now.mono),
         vehicle_type=heartbeat.type,
         autopilot=heartbeat.autopilot,
+        claims=claims or Claims(),
     )
 
 

@@ -54,9 +54,9 @@ class Witness(MavlinkRobotHW):
 
     changes: ClassVar[Changes] = set()
 
-    def take(self, frame: Any, now: Instant) -> TrackedVehicle | None:
+    def take(self, frame: Any, now: Instant, way: Any = None) -> TrackedVehicle | None:
         """Take one frame, and note the facts that it changes."""
-        sender = super().take(frame, now)
+        sender = super().take(frame, now, way)
         vehicle = self.find(*frame[1])
         if vehicle is not None:
             found = outdated(vehicle, now, self.options)

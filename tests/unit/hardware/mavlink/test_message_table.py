@@ -16,7 +16,20 @@ from mav_robot_status.hardware.mavlink.handlers import HANDLERS
 from mav_robot_status.mavlink import definitions as mav
 
 from . import driver
-from .driver import ACTIVE, AHRS, CRITICAL, FITTED, GYRO, PREARM, TERMINATED, Flight, copter, px4, rover
+from .driver import (
+    ACTIVE,
+    AHRS,
+    CRITICAL,
+    FITTED,
+    GYRO,
+    PREARM,
+    TERMINATED,
+    Flight,
+    copter,
+    frame_of,
+    px4,
+    rover,
+)
 from .random_flights import MESSAGES, fly
 from .settled import ROWS, Changes, Mark, Witness, ignore_table, marks, omissions, switch_off
 from .test_sequences import Outputs
@@ -192,8 +205,27 @@ def a_copter_climbs_in_the_first_second_of_a_hold() -> None:
     flight.wait(1)
 
 
+def two_clocks_alternate_sample_by_sample() -> None:
+    flight = copter()
+    for _ in range(5):
+        for boot_ms in (900_000, 0):
+            flight.wait(0.3)
+            flight.send(mav.SystemTime(0, boot_ms + flight.boot_ms))
+    assert 9002 in flight.codes
+
+
+def another_sender_disagrees_for_some_time() -> None:
+    flight = copter()
+    for pause in (0.6, 2, 2):
+        flight.wait(pause)
+        flight.hw.take(frame_of(flight.heartbeat()._replace(custom_mode=5)), flight.clock.now(), "another way")
+    assert flight.wait(2)[-1].error_code == 9002
+
+
 STORIES: Final[list[Callable[[], Any]]] = [
     a_rover_turns_while_its_outputs_are_held,
+    two_clocks_alternate_sample_by_sample,
+    another_sender_disagrees_for_some_time,
     *(
         partial(a_motor_stops_turning_while_its_output_is_at_the_stop_value, make, rpm)
         for make, rpm in (

@@ -1,0 +1,62 @@
+"""Two senders that speak in turn on one way: a value that goes to and fro faster than one vehicle changes it."""
+
+from __future__ import annotations
+
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from ....mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ....mavlink.definitions import Heartbeat
+
+TURN: Final = 10.0
+"""Seconds within which two autopilots with the same ids alternate."""
+
+
+def is_armed(heartbeat: Heartbeat) -> bool:
+    """Whether a heartbeat says armed."""
+    return bool(heartbeat.base_mode & MAV_MODE_FLAG_SAFETY_ARMED)
+
+
+class Rule(NamedTuple):
+    """What one vehicle does not do: alternate between two values of this in so many runs within so many seconds."""
+
+    what: str
+    of: Callable[[Heartbeat], Any]
+    runs: int
+    within: float
+
+
+RULES: Final = (
+    Rule("HEARTBEAT.type and autopilot", attrgetter("autopilot", "type"), 3, TURN),
+    Rule("armed and disarmed", is_armed, 4, 3.0),
+    Rule("HEARTBEAT.custom_mode", attrgetter("custom_mode"), 6, 3.0),
+)
+"""No vehicle changes its type twice without a reboot. A person may arm, disarm and arm again within seconds, and turn
+a mode switch to and fro, but not as often as two senders do."""
+
+
+class Turns:
+    """The latest runs of equal values in the heartbeats of one way, for each rule."""
+
+    __slots__ = ("_runs",)
+
+    def __init__(self) -> None:
+        self._runs: tuple[list[tuple[Any, float]], ...] = tuple([] for _ in RULES)
+
+    def heard(self, heartbeat: Heartbeat, now: float) -> str | None:
+        """Note a heartbeat that differs from the one before. Returns what is said in turn, if two senders do that."""
+        found = None
+        for rule, runs in zip(RULES, self._runs, strict=True):
+            value = rule.of(heartbeat)
+            if runs and runs[-1][0] == value:
+                continue
+            runs.append((value, now))
+            del runs[: -rule.runs]
+            alternate = all(run[0] == runs[i % 2][0] for i, run in enumerate(runs))
+            if len(runs) == rule.runs and alternate and now - runs[0][1] <= rule.within:
+                found = rule.what
+        return found

@@ -15,7 +15,6 @@ from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
 from .derive import derive
 from .evidence import EvidenceOfVehicle
 from .handlers import overheard, pass_time
-from .handlers.heartbeat import LONG_LOSS
 from .identity import is_autopilot, named
 from .message_table import APPLET_ID, COMMAND_IDS, HEARTBEAT_ID, KINDS
 from .moment import Moment
@@ -354,7 +353,7 @@ class MavlinkRobotHW(RobotHW):
         """The vehicle whose entry leaves the ids open, if this sender takes it over from the one before.
 
         Component 1 is the autopilot: it takes the entry at once from another component of its system, and what that one
-        says stays a claim. Any other sender takes it only after a long silence. Until then it is a claim itself.
+        says stays a claim. Any other component of the system is a claim itself.
         """
         _, ids, sequence, heartbeat, _, _ = frame
         for tracked in self._expected:
@@ -362,9 +361,7 @@ class MavlinkRobotHW(RobotHW):
             if owner is None or tracked.slot.component is not None or tracked.slot.system not in (None, ids[0]):
                 continue
             same_system = owner[0] == ids[0]
-            better = same_system and ids[1] == MAV_COMP_ID_AUTOPILOT1
-            heard_at = tracked.handle.heard_at
-            if better or heard_at is None or now.mono - heard_at > LONG_LOSS:
+            if same_system and ids[1] == MAV_COMP_ID_AUTOPILOT1:
                 log.info("vehicle %d.%d: its handle '%s' is now that of %d.%d", *owner, tracked.handle.name, *ids)
                 former = tracked.claims.mine
                 _make_unheard(tracked)
@@ -372,7 +369,7 @@ class MavlinkRobotHW(RobotHW):
                 del self._tracked[owner]
                 self.claims.pop(owner, None)
                 self._give(tracked, ids)
-                if former is not None and same_system:
+                if former is not None:
                     tracked.claims.others[owner] = former
                 return tracked
             if same_system:

@@ -101,7 +101,7 @@ class Flight:
         vehicle_type: int = QUAD,
         *,
         options: HardwareOptions | None = None,
-        slots: tuple[ExpectedVehicle, ...] = (),
+        slots: tuple[ExpectedVehicle, ...] = (ExpectedVehicle(1, 1),),
         streams: bool = True,
         version: tuple[int, int, int] | None = None,
     ) -> None:

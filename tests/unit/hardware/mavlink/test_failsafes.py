@@ -181,7 +181,7 @@ def test_an_event_long_before_a_failsafe_or_after_it_lasts_as_before() -> None:
 
 
 def test_the_health_of_a_compass_counts_from_version_4_1_on() -> None:
-    flight = copter()
+    flight = copter(version=None)
     flight.set(health=flight.health & ~MAG).wait(15)
     assert flight.codes == [3002]  # the version is not known: the fault is reported
     assert flight.send(AutopilotVersion(0x040005FF)).codes == []

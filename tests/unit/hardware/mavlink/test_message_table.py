@@ -222,10 +222,23 @@ def another_sender_disagrees_for_some_time() -> None:
     assert flight.wait(2)[-1].error_code == 9002
 
 
+RC: Final = 1 << 16
+
+
+def the_radio_is_reported_after_the_text_of_a_failsafe() -> None:
+    flight = rover()
+    flight.set(present=flight.present | RC, enabled=flight.enabled | RC, health=flight.health | RC).wait(12)
+    flight.hb(armed=True, state=ACTIVE).wait(2)
+    flight.stop("sys_status").wait(2)
+    flight.text("Radio Failsafe").hb(state=CRITICAL).resume().wait(1)
+    assert flight.codes == [2002]
+
+
 STORIES: Final[list[Callable[[], Any]]] = [
     a_rover_turns_while_its_outputs_are_held,
     two_clocks_alternate_sample_by_sample,
     another_sender_disagrees_for_some_time,
+    the_radio_is_reported_after_the_text_of_a_failsafe,
     *(
         partial(a_motor_stops_turning_while_its_output_is_at_the_stop_value, make, rpm)
         for make, rpm in (

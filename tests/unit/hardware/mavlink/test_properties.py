@@ -22,6 +22,7 @@ from mav_robot_status.hardware.mavlink.state import text_assembly
 from mav_robot_status.hardware.mavlink.state.heartbeat_history import RUNS
 from mav_robot_status.hardware.mavlink.state.latest_messages import REMEMBERED
 from mav_robot_status.hardware.mavlink.state.vehicle_state import VehicleState
+from mav_robot_status.hardware.mavlink.vehicle import ExpectedVehicle
 from mav_robot_status.interface import Detail, IndustrialRobotStatusHandle, RobotMode, RobotStatus, TriState
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.mavlink.encode import enclose
@@ -147,7 +148,7 @@ class Walk:
     """The hardware interface, fed step by step."""
 
     def __init__(self, options: HardwareOptions) -> None:
-        self.hw = MavlinkRobotHW(options)
+        self.hw = MavlinkRobotHW(options, [ExpectedVehicle(1, 1)])
         self.now = START
         self.take(FIRST)
 

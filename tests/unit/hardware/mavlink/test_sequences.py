@@ -91,7 +91,7 @@ def test_a_companion_alone_is_not_a_vehicle() -> None:
 
 def test_two_vehicles_have_two_handles_and_the_loss_of_one_does_not_change_the_other() -> None:
     """Q04"""
-    flight = flying()
+    flight = flying(slots=())
     flight.stream("second", lambda: mav.Heartbeat(4, 10, 3, 129, 4, 3), ids=(2, 1))
     flight.wait(2)
     second = flight.hw.find(2, 1)

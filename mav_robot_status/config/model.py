@@ -29,7 +29,7 @@ class LinkConfig:
     """Nothing is ever sent there."""
     robot_status: Annotated[bool | None, Or("auto")] = None
     """Whether ROBOT_STATUS is sent to the vehicles there. None: yes, except on serial links, which are slow."""
-    speech_limit: Annotated[float | None, Within(0.0, 1e6, "B/s"), Or("auto")] = None
+    speech_limit: Annotated[float | None, Within(0.0, 1e5, "B/s"), Or("auto")] = None
     """The most bytes a second that we send there without being asked. 0: no limit. None: 1000 on a link to vehicles,
     no limit on an out, which is an order to send."""
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface.fields import STATES
-from ...interface.status import Detail, LinkState, RobotStatus, Vehicle
+from ...interface.status import Detail, Inhibit, LinkState, RobotStatus, Vehicle
 from ...mavlink.definitions import AUTOPILOT_NAMES, STATE_NAMES, TYPE_NAMES
 from . import causes
 from .identity import named
@@ -21,10 +21,11 @@ from .rules.errors import active_errors, in_error
 from .rules.flight_mode import flight_mode
 from .rules.in_motion import in_motion
 from .rules.inhibits import inhibit, inhibits
-from .rules.reason import FALSE, TRUE, Reason, Source
+from .rules.reason import FALSE, TRUE, Finding, Reason, Source
 
 if TYPE_CHECKING:
     from ...clock import Instant
+    from ...interface.status import TriState
     from .autopilots.modes import FlightMode
     from .facts import Facts
     from .options import HardwareOptions
@@ -71,9 +72,7 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
         system=ids[0],
         component=ids[1],
         errors=tuple(error.cause for error in errors),
-        inhibits=()
-        if possible is TRUE or (doubted and possible is not FALSE)
-        else inhibits(facts, options, mode, (stopped, why_stopped), before, now),
+        inhibits=_why_not(facts, possible, options, mode, (stopped, why_stopped), before, now),
         vehicle=_vehicle(facts) if doubted and not facts.claimed.one_mode else _running(facts, mode),
         link=LinkState.CONNECTED,
     )
@@ -86,6 +85,23 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
         "in_error": why_wrong,
     }
     return Derived(status, detail, reasons)
+
+
+def _why_not(
+    facts: Facts,
+    possible: TriState,
+    options: HardwareOptions,
+    mode: FlightMode,
+    stopped: Finding,
+    before: Detail,
+    now: Instant,
+) -> tuple[Inhibit, ...]:
+    """The inhibits. While senders differ, what one of them says is no reason."""
+    if possible is TRUE:
+        return ()
+    if facts.claimed.doubted and possible is not FALSE:
+        return (inhibit("SENDER_UNCERTAIN", None, before, now),)
+    return inhibits(facts, options, mode, stopped, before, now)
 
 
 def _lost(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, options: HardwareOptions) -> Derived:

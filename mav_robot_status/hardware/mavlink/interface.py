@@ -25,7 +25,7 @@ from .rules.inhibits import inhibit
 from .settle import claimed, facts_of
 from .state import motion
 from .state.applet import is_word
-from .state.claims import CLOCKS, CONTINUES, Claims, Outcome
+from .state.claims import CLOCKS, CONTINUES, COUNTED_APART, Claims, Outcome
 from .state.latest_messages import SILENCE
 from .state.vehicle_state import begin
 from .vehicle import ExpectedVehicle, TrackedVehicle
@@ -123,7 +123,7 @@ class MavlinkRobotHW(RobotHW):
             if claims.way is not way:
                 if not self._is_heard_elsewhere(tracked, frame, now, way):
                     return None
-            else:
+            elif message_id != COUNTED_APART:
                 if (sequence - claims.sequence) & 255 > CONTINUES:
                     claims.broken = True
                 claims.sequence = sequence
@@ -383,7 +383,8 @@ class MavlinkRobotHW(RobotHW):
         claims, state = tracked.claims, tracked.state
         if claims.mine is None:
             return True
-        claims.follow(way, sequence)
+        if message_id != COUNTED_APART:
+            claims.follow(way, sequence)
         booted = state.boot.at if state is not None and state.boot.clock_ms is not None else None
         if message_id == HEARTBEAT_ID and is_autopilot(message, ids[1]):
             before = claims.way

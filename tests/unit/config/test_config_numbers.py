@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from mav_robot_status.cli import main
 from mav_robot_status.config import Config, load
-from mav_robot_status.config.model import IdentityConfig, SigningConfig, VehicleConfig
+from mav_robot_status.config.model import IdentityConfig, LinkConfig, SigningConfig, VehicleConfig
 from mav_robot_status.gateway.plugins import OURS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions, Within
 from mav_robot_status.interface.options import Options
@@ -28,6 +28,7 @@ SECTIONS: list[tuple[type, str]] = [
     (IdentityConfig, "identity: {{{}: VALUE}}\n"),
     (SigningConfig, "signing: {{key_file: key, {}: VALUE}}\n"),
     (VehicleConfig, "vehicles: [{{{}: VALUE}}]\n"),
+    (LinkConfig, "links: [{{url: 'udp:127.0.0.1:14550', {}: VALUE}}]\n"),
     (HardwareOptions, "hardware: {{{}: VALUE}}\n"),
 ]
 PUBLISHERS: list[tuple[str, type[Options], str]] = [

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mav_robot_status.clock import Instant, later
-from mav_robot_status.config import Config, LinkConfig
+from mav_robot_status.config import Config, LinkConfig, VehicleConfig
 from mav_robot_status.gateway.arrival import BATCH, Arrivals, Pause, arrived
 from mav_robot_status.gateway.mavlink_hardware import LinkSource, MavlinkHardware
 from mav_robot_status.interface import LinkState
@@ -153,7 +153,11 @@ class Gateway:
     """MAVLink hardware whose link is replaced by prepared pieces."""
 
     def __init__(self, *links: FakeLink) -> None:
-        config = Config(links=tuple(LinkConfig("udpin:127.0.0.1:0") for _ in links), requests="none")
+        config = Config(
+            links=tuple(LinkConfig("udpin:127.0.0.1:0") for _ in links),
+            requests="none",
+            vehicles=(VehicleConfig(1, 1),),
+        )
         self.hardware = MavlinkHardware(config, lambda: SINCE)
         for endpoint, link in zip(self.hardware.hub.endpoints, links, strict=True):
             endpoint.link.close()

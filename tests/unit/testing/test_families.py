@@ -232,7 +232,7 @@ def test_a_lost_joystick_is_an_error_until_the_state_is_normal() -> None:
 
 def test_without_a_landed_state_a_sub_at_rest_is_at_rest() -> None:
     dive = Screening(ardusub.READY)
-    assert dive.at(6.0) == "MANUAL | F F F F F | 0"
+    assert dive.at(6.0) == "MANUAL | ? F F F F | 0"
     assert dive.at(600.0) == "MANUAL | F F F F F | 0"
 
 
@@ -448,9 +448,9 @@ def test_a_stop_that_a_ground_station_commands_is_known_when_the_plane_has_accep
     accepted = MAVLink_command_ack_message(218, 0, 0, 0, *GROUND_STATION)
     flight = Screening(arduplane.AUTO)
     assert flight.at(14.0) == "AUTO | ? T T T F | 0"
-    assert flight.receive(aux_function(HIGH), GROUND_STATION) == "AUTO | ? T T T F | 0"
+    assert flight.receive(aux_function(HIGH), GROUND_STATION) == "AUTO | ? ? ? T F | 0"
     assert flight.receive(accepted) == "AUTO | T F F T F | 0"
     assert {"E_STOPPED"} == flight.inhibits.keys()
-    assert flight.at(17.0) == "AUTO | T F F T F | 0"
+    assert flight.at(17.0) == "AUTO | ? ? ? T F | 0"  # it flies on under power
     flight.receive(aux_function(LOW), GROUND_STATION)
     assert flight.receive(accepted) == "AUTO | F T T T F | 0"

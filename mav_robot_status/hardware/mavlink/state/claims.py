@@ -43,6 +43,8 @@ COPIES: Final = 3.0
 """Seconds within which a router delivers a copy of a heartbeat on another way."""
 CONTINUES: Final = 48
 """Sequence numbers continue a count if they are ahead of it by at most this. Unwanted and lost frames lie between."""
+COUNTED_APART: Final = 42
+"""MISSION_CURRENT: Betaflight counts its sequence numbers apart from those of all other messages (recorded)."""
 SIGNED_LASTS: Final = 30.0
 """Seconds after a verified frame in which frames without a verified signature are no claims."""
 MOST_CLAIMS: Final = 8

@@ -70,6 +70,7 @@ def test_the_bits_of_the_inhibits_are_those_of_the_specification() -> None:
         (11, "SYS_STATUS_MISSING"),
         (12, "MODE_MANUAL"),
         (13, "STOP_UNCERTAIN"),
+        (14, "SENDER_UNCERTAIN"),
     ]
 
 

@@ -105,7 +105,7 @@ def test_no_rate_that_another_program_has_set_is_lowered(
     assert in_time(ground.wait_for("ATTITUDE", after=now, count=40).at - now, 3.0)
     assert not asked_for(rover) & set(fast)
     ours = [m for m in rover.heard("COMMAND_LONG") if m.get_srcComponent() == 192]
-    assert {m.command for m in ours} <= {SET_INTERVAL, REQUEST_MESSAGE}
+    assert {m.command for m in ours} <= {SET_INTERVAL, GET_INTERVAL, REQUEST_MESSAGE}
     assert gate.stop() == 0
 
 

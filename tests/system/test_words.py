@@ -102,7 +102,8 @@ def test_a_vehicles_text_is_shown_by_its_codes(log: Path) -> None:
 def test_a_live_gateway_writes_no_control_character(gateway: StartGateway, wire: OpenWire) -> None:
     gate = gateway("udpin:127.0.0.1:0", "-v")
     rover = wire(gate.address).beating()
-    rover.send(MAVLink_statustext_message(2, f"Yaw Imbalance {HOSTILE}".encode()[:50]))
+    rover.beat(armed=True)
+    rover.send(MAVLink_statustext_message(2, f"Crash: Disarming {HOSTILE}".encode()[:50]))
     gate.wait_for(lambda s: any("52;c" in (i["text"] or "") for i in [*s["errors"], *s["inhibits"]]))
     assert gate.stop() == 0
     assert is_visible("\n".join(gate.log))

@@ -46,7 +46,9 @@ ESTABLISHED: Final = 5.0
 LOGGED: Final = 5
 """The most ids in one log line."""
 GONE: Final = 10.0
-"""Seconds after its link loss for which another vehicle keeps them: a few heartbeats may be forged, or a mistake."""
+"""Seconds after its link loss for which another vehicle keeps them, if there are more than MOST_PASSING of its kind: a
+few heartbeats may be forged, or a mistake."""
+MOST_PASSING: Final = 8
 LOG_WAYS: Final = 10.0
 """Seconds between two log lines about the way of one vehicle."""
 
@@ -81,6 +83,8 @@ class MavlinkRobotHW(RobotHW):
         self.asks = False
         """Whether `due_requests` is called at all."""
         self._newcomers = Newcomers()
+        self._crowded_until = -math.inf
+        """Until when (monotonic seconds) vehicles that were heard only briefly give up their places."""
         self._expire_at = math.inf
         """When (monotonic seconds) the first vehicle that is not established loses its place."""
         self._unheard = True
@@ -320,10 +324,14 @@ class MavlinkRobotHW(RobotHW):
         return self._open and tracked.handle.detail.link is LinkState.LOST and not tracked.established
 
     def _expire(self, now: float) -> None:
-        """Free the places of the vehicles that are silent and were heard only briefly."""
+        """Free the places of the vehicles that are silent and were heard only briefly, if there are many."""
         passing = [tracked for tracked in self._tracked.values() if self._is_passing(tracked)]
         keep = self.options.heartbeat_timeout + GONE
         gone = [tracked for tracked in passing if now >= _last_heard(tracked) + keep]
+        if len(passing) > MOST_PASSING:
+            self._crowded_until = now + keep
+        elif now > self._crowded_until:
+            gone, passing = [], [tracked for tracked in passing if now < _last_heard(tracked) + keep]
         self._expire_at = min((_last_heard(t) + keep for t in passing if t not in gone), default=math.inf)
         if gone:
             first = ", ".join("{}.{}".format(*(tracked.ids or (0, 0))) for tracked in gone[:LOGGED])

@@ -230,7 +230,7 @@ class Claims(Generic[C]):
             mine.former_at = armed_at  # no vehicle becomes another one
         if mine.armed and not is_armed(before) and not continues and now.mono - armed_at <= HOLD:
             self.contradict("two counts of sequence numbers, armed and disarmed", mine.way, now)
-        turns = self._turns.heard(heartbeat, now.mono)
+        turns = self._turns.heard(heartbeat, now.mono, counted=continues and mine.counts)
         if turns is not None:
             self.contradict(f"{turns} in turn", mine.way, now)
 

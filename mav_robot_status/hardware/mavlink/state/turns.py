@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from ....mavlink.definitions import Heartbeat
 
+PERIOD: Final = 0.9
+"""Seconds between two heartbeats of one autopilot, with a margin. Quicker turns are those of one sender."""
 TURN: Final = 10.0
 """Seconds within which two autopilots with the same ids alternate."""
 
@@ -28,15 +30,18 @@ class Rule(NamedTuple):
     of: Callable[[Heartbeat], Any]
     runs: int
     within: float
+    one_may: bool
+    """Whether one sender may do it after all, if its sequence numbers show that it is one."""
 
 
 RULES: Final = (
-    Rule("HEARTBEAT.type and autopilot", attrgetter("autopilot", "type"), 3, TURN),
-    Rule("armed and disarmed", is_armed, 4, 3.0),
-    Rule("HEARTBEAT.custom_mode", attrgetter("custom_mode"), 6, 3.0),
+    Rule("HEARTBEAT.type and autopilot", attrgetter("autopilot", "type"), 3, TURN, False),
+    Rule("armed and disarmed", is_armed, 5, 4.0, True),
+    Rule("HEARTBEAT.custom_mode", attrgetter("custom_mode"), 6, 3.0, True),
 )
 """No vehicle changes its type twice without a reboot. A person may arm, disarm and arm again within seconds, and turn
-a mode switch to and fro, but not as often as two senders do."""
+a mode switch to and fro, but not as often as two senders do. A program may: then one count of sequence numbers goes on.
+"""
 
 
 class Turns:
@@ -45,18 +50,23 @@ class Turns:
     __slots__ = ("_runs",)
 
     def __init__(self) -> None:
-        self._runs: tuple[list[tuple[Any, float]], ...] = tuple([] for _ in RULES)
+        self._runs: tuple[list[tuple[Any, float, bool]], ...] = tuple([] for _ in RULES)
 
-    def heard(self, heartbeat: Heartbeat, now: float) -> str | None:
-        """Note a heartbeat that differs from the one before. Returns what is said in turn, if two senders do that."""
+    def heard(self, heartbeat: Heartbeat, now: float, *, counted: bool = False) -> str | None:
+        """Note a heartbeat that differs from the one before. Returns what is said in turn, if two senders do that.
+
+        `counted`: its sequence number continues the count of the one before.
+        """
         found = None
         for rule, runs in zip(RULES, self._runs, strict=True):
             value = rule.of(heartbeat)
             if runs and runs[-1][0] == value:
                 continue
-            runs.append((value, now))
+            runs.append((value, now, counted))
             del runs[: -rule.runs]
             alternate = all(run[0] == runs[i % 2][0] for i, run in enumerate(runs))
-            if len(runs) == rule.runs and alternate and now - runs[0][1] <= rule.within:
+            is_one = rule.one_may and all(run[2] for run in runs[1:])
+            long = now - runs[0][1]
+            if len(runs) == rule.runs and alternate and not is_one and PERIOD <= long <= rule.within:
                 found = rule.what
         return found

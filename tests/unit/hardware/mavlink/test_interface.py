@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from mav_robot_status.hardware.mavlink.interface import ESTABLISHED, MOST_VEHICLES, MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.interface import ESTABLISHED, MOST_PASSING, MOST_VEHICLES, MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.vehicle import ExpectedVehicle
 from mav_robot_status.interface import LinkState, RobotStatus, TriState
@@ -201,9 +201,19 @@ def beats(hw: MavlinkRobotHW, clock: ManualClock, seconds: float, *ids: tuple[in
     hw.read(clock.now())
 
 
-def test_a_vehicle_heard_briefly_gives_up_its_place_and_its_handle() -> None:
+def test_a_vehicle_heard_briefly_stays_as_lost() -> None:
     hw, clock = MavlinkRobotHW(), ManualClock()
     beats(hw, clock, 3, (7, 1))
+    clock.advance(1000)
+    hw.read(clock.now())
+    hw.read(clock.now())
+    assert hw.handles.get_handle(NAME).detail.link is LinkState.LOST
+    assert hw.next_due() == math.inf
+
+
+def test_many_vehicles_heard_briefly_give_up_their_places_and_their_handles() -> None:
+    hw, clock = MavlinkRobotHW(), ManualClock()
+    beats(hw, clock, 3, *((7 + n, 1) for n in range(MOST_PASSING + 1)))
     handle = hw.handles.get_handle(NAME)
     clock.advance(5)
     hw.read(clock.now())

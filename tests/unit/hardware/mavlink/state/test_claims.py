@@ -295,9 +295,18 @@ def test_a_person_who_arms_disarms_and_arms_again_is_not_a_conflict() -> None:
 def test_modes_in_turn_on_one_way_are_a_conflict() -> None:
     air = Air()
     for number in range(8):
-        air.beat(mode=3 + number % 2)
+        air.beat(mode=3 + number % 2, sequence=number + 100 * (number % 2))
         air.wait(0.4)
     assert air.status.error_code == 9002
+
+
+def test_a_program_that_arms_and_disarms_in_turn_is_one_sender_if_its_count_goes_on() -> None:
+    air = Air()
+    for number in range(8):
+        air.beat(armed=number % 2 == 1, mode=3 + number % 2)
+        air.wait(0.1)
+    assert air.status.error_code == 0
+    assert air.status.drives_powered is TRUE
 
 
 def test_another_vehicle_that_takes_over_after_a_loss_starts_with_a_new_state() -> None:

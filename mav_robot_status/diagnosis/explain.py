@@ -19,12 +19,14 @@ from ..gateway.replay import ReplayPipeline, run_through
 from ..interface import LinkState
 from ..interface.explanation import explanation
 from ..streams import NO_OUTPUT
+from . import applet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from typing import TextIO
 
     from ..config import Config
+    from ..hardware.mavlink.interface import MavlinkRobotHW
     from ..interface import HardwareInterface, IndustrialRobotStatusHandle
     from ..links.log import Stamped
 
@@ -45,7 +47,7 @@ def explain_log(config: Config, path: str, at: str | None) -> list[dict[str, Any
     """
     pipeline = ReplayPipeline(silent(config), NO_OUTPUT)
     end = run_through(pipeline, _up_to(Recording(path), at))
-    return explanations(pipeline.hw, end)
+    return explanations(pipeline.hw, pipeline.vehicles, end)
 
 
 def _up_to(recording: Iterable[Stamped], at: str | None) -> Iterator[Stamped]:
@@ -93,7 +95,7 @@ def explain_live(config: Config, stdout: TextIO, clock: Callable[[], Instant] = 
     gateway.run(until=enough)
     for missing in waits_for():
         log.warning("no answer yet from %s: a running gateway may know more", missing)
-    return explanations(gateway.pipeline.hw, clock())
+    return explanations(gateway.pipeline.hw, gateway.hardware.mavlink.vehicles, clock())
 
 
 def silent(config: Config) -> Config:
@@ -118,12 +120,14 @@ def moment(at: str, start_us: int) -> int:
     return round(time.timestamp() * 1e6)
 
 
-def explanations(hw: HardwareInterface, now: Instant) -> list[dict[str, Any]]:
-    """One explanation for each robot heard."""
+def explanations(hw: HardwareInterface, vehicles: MavlinkRobotHW, now: Instant) -> list[dict[str, Any]]:
+    """One explanation for each robot heard. That of an ArduPilot has a member `applet`."""
     heard = list(filter(_is_heard, hw.handles))
     for handle in heard:
         hw.explain(handle.name, now)
-    return [explanation(handle, now) for handle in heard]
+    reports = applet.reports(vehicles, now)
+    with_applet = {name: {"applet": report} for name, report in reports.items()}
+    return [explanation(handle, now) | with_applet.get(handle.name, {}) for handle in heard]
 
 
 def _is_heard(handle: IndustrialRobotStatusHandle) -> bool:
@@ -154,10 +158,18 @@ def _table(one: dict[str, Any]) -> Iterator[str]:
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
     for row in rows:
         yield "  ".join((row[0].ljust(widths[0]), row[1].ljust(widths[1]), row[2].rjust(widths[2]), row[3]))
+    if "applet" in one:
+        yield f"applet   {_report(one['applet'])}"
     for error in one["errors"]:
         yield f"error    {error['code']} {error['name']} since {error['since']}{_said(error['text'])}"
     for inhibit in one["inhibits"]:
         yield f"inhibit  {inhibit['name']} since {inhibit['since']}{_said(inhibit['text'])}"
+
+
+def _report(report: dict[str, Any] | None) -> str:
+    if report is None:
+        return f"not heard: {applet.PAGE}"
+    return f"RS_STOP {report['value']}, {applet.WORDS[report['value']]}, {report['age']:.1f} s ago"
 
 
 def _said(text: str | None) -> str:

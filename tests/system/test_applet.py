@@ -105,10 +105,7 @@ def test_doctor_does_not_name_the_applet_for_an_autopilot_that_cannot_run_it(
 
 # -- the status --------------------------------------------------------------------------------------------------------
 
-without_rule = pytest.mark.xfail(run=False, reason="no rule reads RS_STOP yet")
 
-
-@without_rule
 def test_the_applet_makes_e_stopped_known_while_it_reports(
     vehicle: Callable[[Scenario], FakeAutopilot], gateway: Callable[..., Gateway]
 ) -> None:
@@ -127,7 +124,6 @@ def test_the_applet_makes_e_stopped_known_while_it_reports(
     gate.wait_for_log("applet")
 
 
-@without_rule
 def test_explain_names_the_applet_as_the_evidence(vehicle: Callable[[Scenario], FakeAutopilot]) -> None:
     rover = vehicle(with_applet(armed(ardurover.READY)))
     rover.set(emergency_stop=True)
@@ -135,3 +131,9 @@ def test_explain_names_the_applet_as_the_evidence(vehicle: Callable[[Scenario], 
     why = report["fields"]["e_stopped"]
     assert why["rule"] == "the applet on the autopilot says so"
     assert "RS_STOP" in why["source"]
+    assert report["applet"]["value"] == 1
+
+
+def test_explain_says_that_the_applet_is_not_heard(vehicle: Callable[[Scenario], FakeAutopilot]) -> None:
+    report = found("explain", vehicle(armed(ardurover.READY)), lambda report: "applet" in report)
+    assert report["applet"] is None

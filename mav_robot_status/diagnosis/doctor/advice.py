@@ -10,19 +10,19 @@ import re
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...mavlink import definitions as mav
-from ...mavlink.applet import WORDS
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_ARDUPILOTMEGA, MAV_AUTOPILOT_PX4
+from ..applet import PAGE, WORDS
 from .findings import HEARTBEAT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from .findings import Findings, Speaker
+    from ..applet import PAGE, WORDS
+from .findings import Findings, Speaker
 
 BROKEN: Final = 50.0
 """From this percentage of lost frames on, the advice is to repair the link first."""
-APPLET_PAGE: Final = "docs/ardupilot-applet.md"
 EVERY_ADDRESS: Final = ("0.0.0.0", "::")
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 
@@ -143,7 +143,7 @@ def applet_heard(vehicle: Speaker) -> Iterator[str]:
         )
 
 
-APPLET_ADVICE: Final = "; for an e_stopped that is always known, put the applet on the autopilot: " + APPLET_PAGE
+APPLET_ADVICE: Final = "; for an e_stopped that is always known, put the applet on the autopilot: " + PAGE
 OTHER_SYSTEM: Final = (
     "give one of them another system id (ArduPilot: SYSID_THISMAV, from 4.7 on MAV_SYSID; PX4: MAV_SYS_ID)"
 )

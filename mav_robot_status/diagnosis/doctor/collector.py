@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 from ...gateway.observer import Observer
 from ...hardware.mavlink.identity import is_autopilot, named
+from ...hardware.mavlink.state.applet import is_word, value_of
 from ...hardware.mavlink.state.boot_clock import APART
 from ...hardware.mavlink.state.claims import CLOCKS
 from ...mavlink import definitions as mav
-from ...mavlink.applet import stop_report
 from ...mavlink.counters import Counters
 from ...mavlink.counters import count as add
 from ...mavlink.framing import Parser
@@ -141,9 +141,9 @@ class _Component:
         if frame.message_id == HEARTBEAT:
             self._note_heartbeat(frame.message, frame.ids[1])
         elif type(frame.message) is mav.NamedValueFloat:
-            report = stop_report(frame.message)
-            if report is not None:
-                self._applet = report, now.mono
+            value = value_of(frame.message) if is_word(frame.message) else None
+            if value is not None:
+                self._applet = value, now.mono
         elif frame.message_id in CLOCKS:
             message = frame.message
             self._note_boot_time(now.mono - message.time_boot_ms / 1000)

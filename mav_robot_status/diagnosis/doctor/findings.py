@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...hardware.mavlink.identity import named
+from ...hardware.mavlink.state.applet import FRESH
 from ...mavlink import definitions as mav
-from ...mavlink.applet import FRESH
 from ...mavlink.counters import Counters
 
 if TYPE_CHECKING:

@@ -14,7 +14,6 @@ from ...errors import LinkError
 from ...gateway.event_loop import EventLoop
 from ...gateway.recorded_log import Recording
 from ...gateway.replay import ReplayPipeline, run_through
-from ...hardware.mavlink.autopilots import ARDUPILOT
 from ...hardware.mavlink.autopilots.wanted import COMMON
 from ...hardware.mavlink.message_table import WANTED_IDS
 from ...hardware.mavlink.requests.message_intervals import LOOK, wanted_of
@@ -23,6 +22,7 @@ from ...links.url import parse
 from ...mavlink.component import DEFAULT_SYSTEM, Component
 from ...mavlink.framing import Frame, Parser
 from ...streams import NO_OUTPUT
+from .. import applet
 from ..explain import silent
 from . import probes
 from .advice import protocol
@@ -177,5 +177,5 @@ def _status(hw: MavlinkRobotHW, tracked: TrackedVehicle, now: Instant) -> Vehicl
         tuple(inhibit["name"] for inhibit in explained["inhibits"]),
         wanted,
         explained["vehicle"].get("firmware"),
-        can_run_applet=state is not None and state.profile is ARDUPILOT,
+        can_run_applet=applet.can_run(state),
     )

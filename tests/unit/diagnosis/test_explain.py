@@ -14,7 +14,7 @@ from mav_robot_status.diagnosis.explain import as_json, as_table, explain_live, 
 from mav_robot_status.errors import UsageError
 from mav_robot_status.gateway.controller_config import DEFAULT_CONTROLLER
 from mav_robot_status.interface import STATES
-from mav_robot_status.mavlink.definitions import Heartbeat
+from mav_robot_status.mavlink.definitions import Heartbeat, NamedValueFloat
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.testing import FakeAutopilot, ardurover
 from tests.recorded.replays import OURS, lines_of
@@ -191,7 +191,49 @@ def test_the_table_has_one_aligned_row_for_each_field(tmp_path: Path) -> None:
     assert rows[2][heading.index("why") :] == "disarmed  [HEARTBEAT.base_mode 65]"
     assert rows[2][: heading.index("why")].endswith("  0.5 s  ")
     assert rows[4][: heading.index("why")].split() == ["in_motion", "UNKNOWN"]  # no message was read, so it has no age
-    assert [row.split()[:2] for row in rows[6:]] == [["inhibit", i["name"]] for i in found[0]["inhibits"]]
+    assert rows[6] == "applet   not heard: docs/ardupilot-applet.md"
+    assert [row.split()[:2] for row in rows[7:]] == [["inhibit", i["name"]] for i in found[0]["inhibits"]]
+
+
+# -- the applet --------------------------------------------------------------------------------------------------------
+
+
+def applet_log(path: Path, *reports: tuple[float, float], autopilot: int = 3) -> str:
+    """A log with a heartbeat every second for ten seconds, and RS_STOP with these times and values."""
+    messages = [(float(at), Heartbeat(0, 10, autopilot, DISARMED, 4, 3)) for at in range(10)]
+    said = [(at, NamedValueFloat(round(at * 1000), value, b"RS_STOP")) for at, value in reports]
+    with open(path, "wb") as log:
+        for sequence, (at, message) in enumerate(sorted([*messages, *said], key=lambda timed: timed[0])):
+            log.write(round(START_US + at * 1e6).to_bytes(8, "big"))
+            log.write(encode(message, system=1, component=1, sequence=sequence))
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (0.0, "no stop"),
+        (1.0, "the emergency stop is engaged"),
+        (2.0, "the safety switch is on"),
+        (3.0, "the emergency stop is engaged, the safety switch is on"),
+    ],
+)
+def test_the_applet_of_an_ardupilot_is_shown_in_words_with_its_age(tmp_path: Path, value: float, words: str) -> None:
+    found = explain_log(Config(), applet_log(tmp_path / "a.tlog", (2.0, 0.0), (3.0, value)), "+4.5")
+    assert found[0]["applet"] == {"value": value, "age": 1.5}
+    assert f"applet   RS_STOP {value:.0f}, {words}, 1.5 s ago" in as_table(found).splitlines()
+
+
+def test_an_applet_that_is_silent_is_not_heard(tmp_path: Path) -> None:
+    found = explain_log(Config(), applet_log(tmp_path / "a.tlog", (2.0, 0.0)), "+8.5")
+    assert found[0]["applet"] is None
+    assert "applet   not heard: docs/ardupilot-applet.md" in as_table(found).splitlines()
+
+
+def test_the_applet_is_not_mentioned_for_another_autopilot(tmp_path: Path) -> None:
+    found = explain_log(Config(), applet_log(tmp_path / "a.tlog", (2.0, 0.0), autopilot=12), "+4.5")
+    assert "applet" not in found[0]
+    assert "applet" not in as_table(found)
 
 
 # -- live --------------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from mav_robot_status import cli
-from mav_robot_status.diagnosis.explain import LISTEN
+from mav_robot_status.diagnosis.explain import ANSWERS, LISTEN
 from mav_robot_status.interface import STATES
 from mav_robot_status.mavlink.definitions import Heartbeat
 from mav_robot_status.mavlink.encode import encode
@@ -208,7 +208,7 @@ def test_a_live_vehicle_is_explained_and_the_command_ends_by_itself(
     gate = gateway("explain", "udpin:127.0.0.1:0", "--as-json")
     begun = time.monotonic()
     autopilot(ardurover.READY, gate.address)
-    assert gate.wait_for_end(LISTEN + SOON) == 0
+    assert gate.wait_for_end(ANSWERS + SOON) == 0
     assert time.monotonic() - begun >= LISTEN
     (line,) = gate.lines
     assert line.status["vehicle"]["type"] == "GROUND_ROVER"

@@ -4,7 +4,7 @@ import io
 import json
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -200,10 +200,12 @@ def test_the_table_has_one_aligned_row_for_each_field(tmp_path: Path) -> None:
 
 def applet_log(path: Path, *reports: tuple[float, float], autopilot: int = 3) -> str:
     """A log with a heartbeat every second for ten seconds, and RS_STOP with these times and values."""
-    messages = [(float(at), Heartbeat(0, 10, autopilot, DISARMED, 4, 3)) for at in range(10)]
-    said = [(at, NamedValueFloat(round(at * 1000), value, b"RS_STOP")) for at, value in reports]
+    messages: list[tuple[float, NamedTuple]] = [
+        (float(at), Heartbeat(0, 10, autopilot, DISARMED, 4, 3)) for at in range(10)
+    ]
+    messages += [(at, NamedValueFloat(round(at * 1000), value, b"RS_STOP")) for at, value in reports]
     with open(path, "wb") as log:
-        for sequence, (at, message) in enumerate(sorted([*messages, *said], key=lambda timed: timed[0])):
+        for sequence, (at, message) in enumerate(sorted(messages, key=lambda timed: timed[0])):
             log.write(round(START_US + at * 1e6).to_bytes(8, "big"))
             log.write(encode(message, system=1, component=1, sequence=sequence))
     return str(path)
@@ -221,13 +223,13 @@ def applet_log(path: Path, *reports: tuple[float, float], autopilot: int = 3) ->
 def test_the_applet_of_an_ardupilot_is_shown_in_words_with_its_age(tmp_path: Path, value: float, words: str) -> None:
     found = explain_log(Config(), applet_log(tmp_path / "a.tlog", (2.0, 0.0), (3.0, value)), "+4.5")
     assert found[0]["applet"] == {"value": value, "age": 1.5}
-    assert f"applet   RS_STOP {value:.0f}, {words}, 1.5 s ago" in as_table(found).splitlines()
+    assert f"applet   RS_STOP {value:.0f}, {words}, 1.5 s ago" in as_table(found)
 
 
 def test_an_applet_that_is_silent_is_not_heard(tmp_path: Path) -> None:
     found = explain_log(Config(), applet_log(tmp_path / "a.tlog", (2.0, 0.0)), "+8.5")
     assert found[0]["applet"] is None
-    assert "applet   not heard: docs/ardupilot-applet.md" in as_table(found).splitlines()
+    assert "applet   not heard: docs/ardupilot-applet.md" in as_table(found)
 
 
 def test_the_applet_is_not_mentioned_for_another_autopilot(tmp_path: Path) -> None:

@@ -248,3 +248,12 @@ def test_every_anchor_of_a_link_is_a_heading() -> None:
 def _anchor(heading: str) -> str:
     """As GitHub makes it."""
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+def test_each_test_that_the_threat_model_names_exists() -> None:
+    text = (ROOT / "docs" / "explanation" / "threat-model.md").read_text("utf-8")
+    named = re.findall(r"`(test_\w+\.py)`: ((?:`test_\w+`(?:, )?)+)", text)
+    assert len(named) > 30
+    for file, names in named:
+        source = (ROOT / "tests" / "system" / file).read_text("utf-8")
+        assert [name for name in re.findall(r"`(\w+)`", names) if f"def {name}(" not in source] == []

@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -260,3 +261,34 @@ def test_eight_forged_peers_do_not_keep_the_vehicle_from_being_a_peer(
     real.socket.settimeout(SOON + 10)
     assert real.socket.recv(1000)  # our heartbeat, or a request
     assert time.monotonic() - start < 15 + SOON
+
+
+def test_without_the_key_nobody_speaks_for_a_vehicle_that_signs(
+    gateway: StartGateway, vehicle: Callable[..., Vehicle], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.delenv("STATE_DIRECTORY", raising=False)
+    key = tmp_path / "key"
+    key.write_text(bytes(range(1, 33)).hex())
+    key.chmod(0o600)
+    gate = gateway(HERE, "--signing-key", str(key))
+    true = vehicle(armed=True)
+    true.mav.signing.secret_key = bytes(range(1, 33))
+    true.mav.signing.sign_outgoing = True
+    true.mav.signing.timestamp = int((time.time() - 1_420_070_400) * 1e5)
+    true.beating(gate.address)
+    begun = gate.wait_for(lambda s: s["drives_powered"] is True).at
+    forgers = [vehicle(armed=False, count=128).beating(gate.address, 0.05) for _ in range(3)]
+    forgers += [vehicle(armed=False, component=component).beating(gate.address) for component in (2, 77)]
+    stop = vehicle(armed=False)
+    stop.to = gate.address
+    for _ in range(20):
+        stop.send(stop.packed(MAVLink_statustext_message(2, b"RC6: MotorEStop HIGH")))
+        stop.send(stop.packed(MAVLink_statustext_message(2, b"RC6: MotorEStop HIGH")), via=true)
+    lines_for(gate, 6)
+    said = [line.status for line in gate.lines if line.at > begun]
+    assert {status["drives_powered"] for status in said} == {True}
+    assert {status["component"] for status in said} == {1}
+    assert not any(status["e_stopped"] is True or status["errors"] for status in said)
+    assert len(forgers) == 5
+    assert gate.stop() == 0

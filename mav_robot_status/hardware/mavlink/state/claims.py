@@ -208,7 +208,7 @@ class Claims(Generic[C]):
             if sequence != mine.number:
                 mine.number, mine.counts = sequence, True
             mine.at = at
-            if mine.armed_at != NEVER and is_armed(heartbeat):
+            if is_armed(heartbeat):  # also if it was a copy before: this is no copy
                 mine.armed_at = at
         else:
             self._changed(mine, heartbeat, sequence, now)

@@ -347,7 +347,7 @@ class Claims(Generic[C]):
         before.booted = None
         before.sequence, before.broken = self.sequence, self.broken
         self._note(before.heartbeat, before.at)
-        self.differed_at = before.at
+        self.differed_at = max(self.differed_at, before.at)
         self._remember(before.way, before)
         self.way, self.mine = way, claim
         if claim is not None:
@@ -381,9 +381,9 @@ class Claims(Generic[C]):
     def _note(self, heartbeat: Heartbeat, at: float) -> None:
         """Note what is said beside the selected way, or no longer on it: for what all agree on during a conflict."""
         if is_armed(heartbeat):
-            self.armed_at = at
+            self.armed_at = max(self.armed_at, at)  # a way that is selected again may have said it long ago
         else:
-            self.disarmed_at = at
+            self.disarmed_at = max(self.disarmed_at, at)
 
     def _compare(self, speaker: Hashable | None, now: Instant) -> None:
         """Hold the live claims against the selected way, after a heartbeat of `speaker` (None: the selected way)."""

@@ -419,3 +419,24 @@ def test_the_first_heartbeat_selects_its_way_without_a_hardware_interface() -> N
     claims: Claims[str] = Claims()
     beat = Frame(0, (1, 1), 0, mav.Heartbeat(0, 2, 3, 0, 3, 3), b"").message
     assert claims.elsewhere(beat, 0, "radio", ManualClock().now(), None, 3.5) is Outcome.SELECTED
+
+
+def test_a_copy_that_becomes_the_selected_way_is_a_claim_of_its_own() -> None:
+    air = Air()
+    air.beat("radio", armed=True, sequence=10)
+    air.beat("cable", armed=True, sequence=10)
+    air.wait(0.1)
+    air.beat("radio", armed=True, sequence=11)
+    air.beat("cable", armed=True, sequence=11)
+    air.wait(11)
+    assert air.beat("cable", armed=True, sequence=22)
+    air.beat("cable", sequence=150)
+    assert air.status.drives_powered is UNKNOWN
+
+
+def test_what_a_way_said_long_ago_does_not_hide_what_another_says_now() -> None:
+    claims = Claims[str]()
+    claims.armed_at = claims.disarmed_at = 20.0
+    for base_mode in (128, 0):
+        claims._note(mav.Heartbeat(0, 10, 3, base_mode, 4, 3), 10.0)
+    assert (claims.armed_at, claims.disarmed_at) == (20.0, 20.0)

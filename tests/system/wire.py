@@ -73,6 +73,7 @@ class Wire:
         assert self.to is not None
         with contextlib.suppress(ConnectionRefusedError):
             self.socket.sendto(data, self.to)
+        self.mav.seq = (self.mav.seq + 1) % 256
 
     def settle(self) -> None:
         """Wait until `heard` has everything that has arrived."""

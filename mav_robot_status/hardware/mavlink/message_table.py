@@ -42,7 +42,7 @@ MOVES: Final[dict[type, tuple[str, ...]]] = {
     mav.ParamValue: ("has_no_lift", "outputs", "outputs_vetoed", "stop_excused"),
     mav.RcChannels: ("stop_switch",),
     mav.ServoOutputRaw: ("has_no_lift", "outputs", "outputs_vetoed", "applet"),
-    mav.SysStatus: ("turns", "sys_status", "stop", "faults"),
+    mav.SysStatus: ("turns", "sys_status", "stop", "faults", "latched"),
     mav.SystemTime: (),
     mav.VfrHud: ("movement", "has_no_lift", "outputs_vetoed"),
 }

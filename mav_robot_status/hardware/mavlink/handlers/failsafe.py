@@ -64,4 +64,3 @@ def radio_heard(state: VehicleState, now: float) -> None:
         is_early = code == causes.FAILSAFE or now <= latch.since.mono + TIMEOUT
         if is_early and found not in (code, causes.FAILSAFE):
             state.latches = {**latches.clear(state.latches, (code,)), found: latch}
-            state.latest.unsettled = True

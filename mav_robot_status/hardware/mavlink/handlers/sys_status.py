@@ -52,7 +52,6 @@ def sys_status(state: VehicleState, message: SysStatus, now: Instant, options: H
 
 def _clear(state: VehicleState, code: int) -> None:
     state.latches = latches.clear(state.latches, (code,))
-    state.latest.unsettled = True
 
 
 def _fence_is_kept(status: SysStatus) -> bool:

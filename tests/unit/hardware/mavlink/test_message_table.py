@@ -19,6 +19,7 @@ from . import driver
 from .driver import (
     ACTIVE,
     AHRS,
+    BATTERY,
     CRITICAL,
     FITTED,
     GYRO,
@@ -234,11 +235,22 @@ def the_radio_is_reported_after_the_text_of_a_failsafe() -> None:
     assert flight.codes == [2002]
 
 
+def a_low_battery_recovers() -> None:
+    flight = copter()
+    flight.wait(12)
+    flight.hb(armed=True, state=ACTIVE).text("Battery 1 is low 10.50V used 1500 mAh")
+    flight.set(health=flight.health & ~BATTERY).wait(20)
+    assert flight.code == 2003
+    flight.set(health=flight.health | BATTERY).wait(2)
+    assert flight.code == 0
+
+
 STORIES: Final[list[Callable[[], Any]]] = [
     a_rover_turns_while_its_outputs_are_held,
     two_clocks_alternate_sample_by_sample,
     another_sender_disagrees_for_some_time,
     the_radio_is_reported_after_the_text_of_a_failsafe,
+    a_low_battery_recovers,
     *(
         partial(a_motor_stops_turning_while_its_output_is_at_the_stop_value, make, rpm)
         for make, rpm in (

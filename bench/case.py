@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from . import workload
-from .contenders import Contenders
+from .contenders import ANY, COALESCING, MAVPROXY, Contenders
 from .results import Sample, Skip, Target
+from .workload import QUARTER, Workload
+
+QUICK = 10
+SHORTEST = 0.4  # s
+LEFT_OUT = (COALESCING, ANY, MAVPROXY)
+"""Not measured in a quick run."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +31,30 @@ class Bench:
     """A recorded log of the user."""
 
     def lasting(self, seconds: float) -> float:
-        """The duration in seconds; a quarter of it in a quick run."""
-        return seconds / 4 if self.quick else seconds
+        """The duration in seconds; a tenth of it in a quick run."""
+        return max(SHORTEST, seconds / QUICK) if self.quick else seconds
 
-    def frames(self, vehicles: int = 1) -> Path:
+    def number(self, full: int) -> int:
+        """A number of repetitions; a tenth of it in a quick run."""
+        return max(2, full // QUICK) if self.quick else full
+
+    def programs(self, everyone: Iterable[str], skipped: list[Skip]) -> Iterator[str]:
+        """The programs to measure, of those named. `skipped` receives those that are not installed."""
+        return self.contenders.each([who for who in everyone if not (self.quick and who in LEFT_OUT)], skipped)
+
+    def frames(self, vehicles: int = 1, traffic: Workload = QUARTER, *, in_step: bool = False) -> Path:
         """A file with the frames of this many vehicles, for a sender."""
-        path = self.place / f"fleet-{vehicles}.frames"
+        words = traffic.name.replace(" ", "-") + ("-in-step" if in_step else "")
+        path = self.place / f"fleet-{vehicles}-{words}.frames"
         if not path.exists():
-            workload.save(path, workload.fleet(vehicles))
+            workload.save(path, workload.fleet(vehicles, traffic, in_step=in_step))
+        return path
+
+    def distinct_frames(self) -> Path:
+        """A file with frames of one vehicle, no two of them equal."""
+        path = self.place / "distinct.frames"
+        if not path.exists():
+            workload.save(path, workload.distinct())
         return path
 
 

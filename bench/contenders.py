@@ -15,11 +15,18 @@ from .process import ROOT, Child
 from .results import OURS, PYMAVLINK, Skip
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
 PEERS: Final = ROOT / "bench" / "peers"
 MAVPROXY, MAVSDK, ROUTER = "MAVProxy", "MAVSDK", "mavlink-routerd"
 COALESCING: Final = "ours, coalesce: 10 ms"
+FILTERED: Final = "ours, kernel filter"
+"""Ours with its filter: the kernel drops datagrams that no status needs. Without it ours reads all frames."""
+NO_FILTER: Final = "--no-kernel-filter"
+LOOP: Final = "Python loop"
+"""A loop over `recv` with our parser."""
+ANY: Final = "pymavlink, any type"
+"""The loop over `recv_match`, without `type=`."""
 PROGRAMS: Final = {MAVPROXY: "mavproxy.py", ROUTER: "mavlink-routerd"}
 
 
@@ -37,6 +44,7 @@ class Contenders:
         )  # a target for programs that must forward; nothing reads it
         self._void.bind(("127.0.0.1", 0))
         self._paths = paths
+        self._has_mavsdk = False
         self._options = subprocess.run(
             [*self.ours(), "run", "--help"], capture_output=True, text=True, check=True, cwd=ROOT
         ).stdout
@@ -55,24 +63,31 @@ class Contenders:
         """Whether our command has this option."""
         return f"{option} " in self._options or f"{option}]" in self._options
 
-    def start_ours(self, port: int, *arguments: str, pipe: bool = False) -> Child:
-        """Our command, listening."""
-        return Child(self.ours(f"udpin:127.0.0.1:{port}", *arguments), pipe=pipe)
+    def start_ours(self, port: int, *arguments: str, pipe: bool = False, filtered: bool = False) -> Child:
+        """Our command, listening. It reads every frame, as the others do, unless it is `filtered`."""
+        whole = [NO_FILTER] if not filtered and self.has_option(NO_FILTER) else []
+        return Child(self.ours(f"udpin:127.0.0.1:{port}", *whole, *arguments), pipe=pipe)
 
     def start_pymavlink(self, port: int, *arguments: str, pipe: bool = False) -> Child:
         """A loop over `recv_match` that prints JSON lines."""
-        return Child([sys.executable, str(PEERS / "pymavlink_status.py"), str(port), *arguments], pipe=pipe)
+        return _peer("pymavlink_status.py", port, *arguments, pipe=pipe)
+
+    def start_loop(self, port: int, *, pipe: bool = False) -> Child:
+        """A loop over `recv` with our parser that prints JSON lines."""
+        return _peer("python_loop.py", port, pipe=pipe)
 
     def start(self, who: str, port: int) -> Child:
         """A program that reads UDP, with its default options. Raises Missing."""
-        if who == OURS:
-            return self.start_ours(port)
+        if who in (OURS, FILTERED):
+            return self.start_ours(port, filtered=who == FILTERED)
         if who == COALESCING:
             config = self._place / "coalesce.yaml"
             config.write_text("coalesce: 10 ms\n")
             return self.start_ours(port, "--config", str(config))
-        if who == PYMAVLINK:
-            return self.start_pymavlink(port)
+        if who == LOOP:
+            return self.start_loop(port)
+        if who in (PYMAVLINK, ANY):
+            return self.start_pymavlink(port, "10", *(("any",) if who == ANY else ()))
         if who == MAVSDK:
             return Child([self._mavsdk(), str(PEERS / "mavsdk_status.py"), str(port)])
         return self.start_forwarding(who, port, int(self._void.getsockname()[1]))
@@ -107,11 +122,13 @@ class Contenders:
 
     def _mavsdk(self) -> str:
         python = self._paths.get(MAVSDK, sys.executable)
-        if subprocess.run([python, "-c", "import mavsdk"], capture_output=True, check=False).returncode:
+        if not self._has_mavsdk:
+            self._has_mavsdk = not _quiet([python, "-c", "import mavsdk"])
+        if not self._has_mavsdk:
             raise Missing(f"the package mavsdk is not installed for {python}")
         return python
 
-    def each(self, who: tuple[str, ...], skipped: list[Skip]) -> Iterator[str]:
+    def each(self, who: Sequence[str], skipped: list[Skip]) -> Iterator[str]:
         """The programs that are installed; the others are recorded as skipped."""
         for name in who:
             try:
@@ -119,6 +136,8 @@ class Contenders:
                     self.path(name)
                 elif name == MAVSDK:
                     self._mavsdk()
+                elif name == FILTERED and not self.has_option(NO_FILTER):
+                    raise Missing("this version lacks it")
             except Missing as missing:
                 skipped.append(Skip("", name, str(missing)))
             else:
@@ -129,15 +148,25 @@ class Contenders:
         found: dict[str, str] = {}
         for name in (MAVPROXY, ROUTER):
             try:
-                found[name] = _version([self.path(name), "--version"])
+                found[name] = version_of([self.path(name), "--version"])
             except Missing:
                 found[name] = "not installed"
         try:
             code = "from importlib.metadata import version as v; print(v('mavsdk'))"
-            found[MAVSDK] = _version([self._mavsdk(), "-c", code])
+            found[MAVSDK] = version_of([self._mavsdk(), "-c", code])
         except Missing:
             found[MAVSDK] = "not installed"
         return found
+
+
+def _peer(name: str, *arguments: object, pipe: bool) -> Child:
+    """A program of `bench/peers`."""
+    return Child([sys.executable, str(PEERS / name), *map(str, arguments)], pipe=pipe)
+
+
+def _quiet(command: list[str]) -> int:
+    """The exit code of a program."""
+    return subprocess.run(command, capture_output=True, check=False, cwd=ROOT).returncode
 
 
 def _which(program: str) -> str | None:
@@ -145,11 +174,11 @@ def _which(program: str) -> str | None:
     return shutil.which(program, path=os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", ""))))
 
 
-def _version(command: list[str]) -> str:
-    """The first version number in the output of a program."""
+def version_of(command: list[str]) -> str:
+    """The first version number in the output of a program, such as 1.8.75, or v4-8 of mavlink-routerd."""
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, cwd=ROOT)
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"unknown ({error})"
-    found = re.search(r"\bv?(\d+\.\d[\w.-]*)", done.stdout + done.stderr)
-    return found[1] if found else "unknown"
+    found = re.search(r"\bv?(\d+\.\d[\w.-]*)|\bv(\d[\w.-]*)|version (\d[\w.-]*)", done.stdout + done.stderr)
+    return found[found.lastindex or 0] if found else "unknown"

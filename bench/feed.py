@@ -82,9 +82,17 @@ class Feed:
         """Send one datagram."""
         self._command(f"raw {data.hex()}")
 
-    def send(self, rate: int, seconds: float) -> tuple[int, float]:
-        """Send. Return the number of frames and the seconds that this took."""
-        self._command(f"{rate} {seconds}")
+    def send(self, rate: int, seconds: float, burst: int = 1) -> tuple[int, float]:
+        """Send, `burst` frames at once. Return the number of frames and the seconds that this took."""
+        self.begin(rate, seconds, burst)
+        return self.end()
+
+    def begin(self, rate: int, seconds: float, burst: int = 1) -> None:
+        """Begin to send, and return at once. `end` waits for the end."""
+        self._command(f"{rate} {seconds} {burst}")
+
+    def end(self) -> tuple[int, float]:
+        """Wait until everything is sent. Return the number of frames and the seconds that this took."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
@@ -93,14 +101,17 @@ class Feed:
         self.total += int(sent)
         return int(sent), float(took)
 
-    def measure(self, child: Child, rate: int, seconds: float) -> Fed:
-        """The CPU time of the child from the first frame until it has read all of them."""
+    def measure(self, child: Child, rate: int, seconds: float, burst: int = 1, *, filtered: bool = False) -> Fed:
+        """The CPU time of the child from the first frame until it has read all of them.
+
+        `filtered`: a filter drops frames in the kernel. The kernel counts them as lost; they are not.
+        """
         dropped_before, cpu_before = self._dropped(), child.cpu()
-        sent, took = self.send(rate, seconds)
+        sent, took = self.send(rate, seconds, burst)
         ended = time.perf_counter()
         complete = drained(self._port)
         behind = time.perf_counter() - ended
-        lost = self._dropped() - dropped_before
+        lost = 0 if filtered else self._dropped() - dropped_before
         return Fed(sent, lost if complete else max(lost, 1), took, child.cpu() - cpu_before, rate, behind)
 
     def warm_up(self, rate: int = 800, seconds: float = 1.0) -> None:

@@ -36,6 +36,7 @@ THIS_PYTHON: Final = f"{sys.version_info.major}.{sys.version_info.minor}"
 START: Final = Instant(1000.0, 1_800_000_000_000_000)
 FRAMES: Final = 1600
 TURNS: Final = 20
+FLEET: Final = 100
 
 
 class Verdict(NamedTuple):
@@ -117,6 +118,21 @@ def publications() -> Iterator[Work]:
         yield lambda: _turns(gateway, now, 0.101), TURNS
 
 
+@contextmanager
+def fleet_turns() -> Iterator[Work]:
+    """Turns of a gateway with many vehicles in which the line of one of them is due."""
+    with _gateway(lambda: START) as (gateway, _):
+        frames = Parser(WANTED_IDS).feed(b"".join(workload.frames(FLEET)))
+        for number in range(FLEET):
+            now = later(START, number / FLEET / 10)
+            for frame in frames:
+                gateway.hardware.mavlink.vehicles.take(frame._replace(ids=(1 + number, 1)), now)
+            gateway.turn(now)
+        now = later(START, 1.0)  # later than all that their first messages change
+        gateway.turn(now)
+        yield lambda: _turns(gateway, now, 0.1 / FLEET), TURNS
+
+
 COUNTED: Final[dict[str, Callable[[], AbstractContextManager[Work]]]] = {
     "Parser.feed, 1400 bytes: per frame": parse_stream,
     "Parser.feed, a datagram: per frame": parse_datagrams,
@@ -124,6 +140,7 @@ COUNTED: Final[dict[str, Callable[[], AbstractContextManager[Work]]]] = {
     "EventLoop.run: per turn with a datagram": wake_ups,
     "EventLoop.turn: nothing to do": idle_turns,
     "EventLoop.turn: statuses at 10 Hz": publications,
+    "EventLoop.turn: one line of 100 vehicles": fleet_turns,
 }
 
 
@@ -131,7 +148,8 @@ COUNTED: Final[dict[str, Callable[[], AbstractContextManager[Work]]]] = {
 def _gateway(clock: Callable[[], Instant]) -> Iterator[tuple[EventLoop, Callable[[bytes], object]]]:
     """A gateway with a manual clock, and a function that sends it a datagram."""
     with open(os.devnull, "w") as nowhere, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        gateway = EventLoop(Config(links=(LinkConfig("udpin:127.0.0.1:0"),)), nowhere, clock)
+        config = Config(links=(LinkConfig("udpin:127.0.0.1:0"),), kernel_filter=False)  # every datagram is a turn
+        gateway = EventLoop(config, nowhere, clock)
         try:
             link: Any = gateway.endpoints[0].link
             out.connect(("127.0.0.1", link.port))

@@ -26,13 +26,23 @@ class BenchError(Exception):
 class Child:
     """A measured process. As a context manager it always ends the process."""
 
-    def __init__(self, command: Sequence[str], *, pipe: bool = False, env: dict[str, str] | None = None) -> None:
-        """Start it. `pipe`: the caller reads its standard output; else it is discarded."""
+    def __init__(
+        self,
+        command: Sequence[str],
+        *,
+        pipe: bool = False,
+        env: dict[str, str] | None = None,
+        terminal: int | None = None,
+    ) -> None:
+        """Start it. `pipe`: the caller reads its standard output; else it is discarded.
+
+        `terminal`: the descriptor of a terminal for its standard input and output.
+        """
         self._log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  # closed with the child
         self.process: subprocess.Popen[bytes] = subprocess.Popen(
             list(command),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE if pipe else subprocess.DEVNULL,
+            stdin=subprocess.DEVNULL if terminal is None else terminal,
+            stdout=subprocess.PIPE if pipe else subprocess.DEVNULL if terminal is None else terminal,
             stderr=self._log,
             cwd=ROOT,
             env=env,
@@ -53,8 +63,28 @@ class Child:
 
     def memory(self) -> float:
         """Resident memory in MB."""
-        found = re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{self.process.pid}/status").read_text())
-        return int(found[1]) / 1024 if found else 0.0
+        return _value("VmRSS", Path(f"/proc/{self.process.pid}/status")) / 1024
+
+    def peak_memory(self, longest: float) -> float:
+        """The largest resident memory in MB, of a process that ends by itself. Raises BenchError if it fails.
+
+        `longest`: the most seconds that it may take.
+        """
+        status, peak = Path(f"/proc/{self.process.pid}/status"), 0
+        deadline = time.monotonic() + longest
+        while self.process.poll() is None:
+            if time.monotonic() > deadline:
+                raise BenchError(f"has not ended after {longest:.0f} s")
+            peak = max(peak, _value("VmHWM", status))
+            time.sleep(0.005)
+        if self.process.returncode:
+            raise BenchError(f"has failed: {self.stop()[-300:].strip()}")
+        return peak / 1024
+
+    def wake_ups(self) -> int:
+        """How often its threads have waited so far: the voluntary context switches."""
+        tasks = Path(f"/proc/{self.process.pid}/task")
+        return sum(_value("voluntary_ctxt_switches", task / "status") for task in tasks.iterdir())
 
     def stop(self) -> str:
         """End it, and return its standard error."""
@@ -74,6 +104,14 @@ class Child:
             if self.process.poll() is not None or time.monotonic() > deadline:
                 raise BenchError(f"does not listen on port {port}: {self.stop()[-300:].strip()}")
             time.sleep(0.01)
+
+
+def _value(name: str, status: Path) -> int:
+    """A number in a status file of the kernel; 0 if it is not there, as for a process that has just ended."""
+    with contextlib.suppress(OSError):
+        found = re.search(rf"^{name}:\s+(\d+)", status.read_text(), re.MULTILINE)
+        return int(found[1]) if found else 0
+    return 0
 
 
 class Queue(NamedTuple):

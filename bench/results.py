@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 
 OURS: Final = "ours"
 PYMAVLINK: Final = "pymavlink"
+FIRST_MACHINE, SECOND_MACHINE = 7.3, 17.5
+"""The machines for which absolute limits were set: microseconds in which pymavlink parses a frame there."""
 
 
 class Sample(NamedTuple):
@@ -44,13 +46,31 @@ class Target(NamedTuple):
     peer: str | None = None
     """None: the limit is absolute."""
     who: str = OURS
+    machine: float | None = None
+    """Of an absolute limit that depends on the machine: the machine for which it was set, such as FIRST_MACHINE."""
+
+    def scaled(self, parse_us: float | None) -> Target:
+        """The target for a machine on which pymavlink parses a frame in `parse_us` microseconds."""
+        if self.machine is None or parse_us is None:
+            return self
+        factor = parse_us / self.machine
+        return self._replace(
+            at_most=None if self.at_most is None else self.at_most * factor,
+            at_least=None if self.at_least is None else self.at_least / factor,
+        )
 
 
 Key = tuple[str, str]
 
 
-def collect(case: str, title: str, rounds: list[list[Sample | Skip]], targets: Iterable[Target]) -> dict[str, Any]:
-    """The result of one case, ready for JSON."""
+def collect(
+    case: str,
+    title: str,
+    rounds: list[list[Sample | Skip]],
+    targets: Iterable[Target],
+    parse_us: float | None = None,
+) -> dict[str, Any]:
+    """The result of one case, ready for JSON. `parse_us`: microseconds in which pymavlink parses a frame here."""
     rows: dict[Key, dict[str, dict[int, float]]] = {}
     notes: dict[str, None] = {}
     for number, found in enumerate(rounds):
@@ -65,7 +85,7 @@ def collect(case: str, title: str, rounds: list[list[Sample | Skip]], targets: I
         "case": case,
         "title": title,
         "rows": [_row(key, values) for key, values in rows.items()],
-        "targets": [_judged(target, rows) for target in targets],
+        "targets": [_judged(target.scaled(parse_us), rows) for target in targets],
         "notes": list(notes),
     }
 

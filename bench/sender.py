@@ -1,8 +1,8 @@
 """A process with its own core that sends frames to a UDP port, one a datagram. Standard input has the commands.
 
-Lines in: `RATE SECONDS` (frames a second, over and over) or `raw HEX`. Line out: frames sent and seconds taken.
-At slow rates each frame is one system call at an absolute deadline. At fast rates sendmmsg sends several frames at
-once; otherwise Python would be the bottleneck.
+Lines in: `RATE SECONDS BURST` (frames a second, over and over, BURST of them at once) or `raw HEX`. Line out: frames
+sent and seconds taken. At slow rates each frame is one system call at an absolute deadline. At fast rates sendmmsg
+sends several frames at once; otherwise Python would be the bottleneck.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import sys
 import time
 from pathlib import Path
 
-FAST = 20_000  # above this rate in frames a second one system call sends several
+FAST = 21_000  # above this rate in frames a second one system call sends several
 STEPS = 4000  # system calls a second at such a rate
 MOST = 64  # the most frames of one system call
 SLEEP = 0.0006  # s; the rest of a wait is a busy loop
@@ -60,8 +60,11 @@ class Sender:
         with contextlib.suppress(OSError):
             self._socket.send(data)
 
-    def run(self, rate: int, seconds: float) -> tuple[int, float]:
-        """Send for `seconds`. Return the number of frames and the seconds that this took."""
+    def run(self, rate: int, seconds: float, burst: int = 1) -> tuple[int, float]:
+        """Send for `seconds`, evenly or in bursts. Return the number of frames and the seconds that this took.
+
+        The frames of a burst follow each other within a fraction of a millisecond; the bursts are evenly spaced.
+        """
         total = round(rate * seconds)
         batch = 1 if rate <= FAST else min(MOST, max(1, rate // STEPS))
         if batch > 1 and self._headers is None:
@@ -75,7 +78,11 @@ class Sender:
                 continue
             if wait > 0:
                 continue
-            sent += self._one() if batch == 1 else self._some(min(batch, total - sent))
+            if batch > 1:
+                sent += self._some(min(batch, total - sent))
+            else:
+                sent += sum(self._one() for _ in range(min(burst, total - sent)))
+        time.sleep(max(0.0, start + sent / rate - time.perf_counter()))  # the pause after the last burst
         return sent, time.perf_counter() - start
 
     def _one(self) -> int:
@@ -116,11 +123,11 @@ def main() -> None:
         os.sched_setaffinity(0, {cores[-1]})
     sender = Sender(list(load(Path(sys.argv[1]))), int(sys.argv[2]))
     for line in sys.stdin:
-        first, second = line.split()
+        first, second, *third = line.split()
         if first == "raw":
             sender.raw(bytes.fromhex(second))
         else:
-            print(*sender.run(int(first), float(second)), flush=True)
+            print(*sender.run(int(first), float(second), *map(int, third)), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """The traffic of the benchmarks: one vehicle at the stream rates of a ground station, the same bytes in every run.
 
-80 frames a second of 26 message types, 36 bytes on average, MAVLink 2. A status needs 16.5 % of the frames. pymavlink
-encodes them, so that our own code does not decide what a valid frame is.
+There are two workloads, each with 80 frames a second of 26 message types, MAVLink 2. In `QUARTER` a status needs 27.5 %
+of the frames, in `HALF` it needs 50 %: attitude, speed and position come at 8 to 10 Hz, as a ground station asks for
+them. pymavlink encodes the frames, so that our own code does not decide what a valid frame is.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import random
 import struct
 import time
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -29,21 +30,43 @@ LOOP: Final = 6400
 """Frames of one loop: whole patterns, and a multiple of 256 for the sequence numbers."""
 SHORT_LOOP: Final = 1280
 """The same for one of many vehicles, to save memory: whole seconds."""
+DISTINCT: Final = 3 * LOOP
+"""Frames of the loop without equal frames, with those that are left out of it."""
 BOOT_MS: Final = 600_000
 STILL_MS: Final = 1500
 """Milliseconds by which the boot clock advances within a loop. A new loop must not look like a reboot."""
 
-SENT: Final[dict[str, int]] = {
+
+class Workload(NamedTuple):
+    """A mix of messages."""
+
+    name: str
+    """In words, for the tables."""
+    sent: dict[str, int]
+    """Name of a message -> how often it is sent in ten seconds."""
+
+
+QUARTER: Final = Workload("a quarter needed", {
     # a status needs these
     "heartbeat": 10, "sys_status": 10, "system_time": 10, "gps_raw_int": 10, "attitude": 10,
     "global_position_int": 10, "vfr_hud": 10, "servo_output_raw": 20, "ekf_status_report": 40, "statustext": 2,
-    # a status does not need these
+    # a status does not need these, except mission_current, rc_channels and battery_status
     "raw_imu": 50, "scaled_imu2": 50, "scaled_imu3": 50, "scaled_pressure": 50, "scaled_pressure2": 40,
     "power_status": 50, "meminfo": 50, "nav_controller_output": 40, "mission_current": 48, "rc_channels": 20,
     "ahrs": 40, "ahrs2": 40, "vibration": 50, "battery_status": 20, "terrain_report": 20,
     "position_target_global_int": 50,
-}  # fmt: skip
-"""Name of a message -> how often it is sent in ten seconds."""
+})  # fmt: skip
+HALF: Final = Workload("half needed", {
+    # a status needs these
+    "heartbeat": 10, "sys_status": 20, "system_time": 10, "gps_raw_int": 20, "attitude": 100,
+    "global_position_int": 80, "vfr_hud": 80, "servo_output_raw": 20, "ekf_status_report": 20, "statustext": 2,
+    "mission_current": 10, "rc_channels": 20, "battery_status": 8,
+    # a status does not need these
+    "raw_imu": 40, "scaled_imu2": 40, "scaled_imu3": 20, "scaled_pressure": 40, "scaled_pressure2": 20,
+    "power_status": 40, "meminfo": 20, "nav_controller_output": 40, "ahrs": 20, "ahrs2": 20, "vibration": 40,
+    "terrain_report": 20, "position_target_global_int": 40,
+})  # fmt: skip
+WORKLOADS: Final = (QUARTER, HALF)
 
 FIXED: Final[dict[str, dict[str, Any]]] = {
     "heartbeat": {"type": 2, "autopilot": 3, "base_mode": 217, "custom_mode": 3, "system_status": 4,
@@ -55,6 +78,7 @@ FIXED: Final[dict[str, dict[str, Any]]] = {
                    "onboard_control_sensors_health_extended": 0},
     "gps_raw_int": {"fix_type": 6},
     "global_position_int": {"vx": 500, "vy": 100, "vz": 0},
+    "battery_status": {"id": 0, "charge_state": 1, "fault_bitmask": 0},  # healthy
     "ekf_status_report": {"flags": 831},  # all estimates
     "vfr_hud": {"airspeed": 5.0, "groundspeed": 5.0, "throttle": 40},
     "statustext": {"severity": 6, "text": b"EKF3 IMU0 is using GPS", "id": 0, "chunk_seq": 0},
@@ -67,7 +91,9 @@ RANGES: Final = {
 }  # fmt: skip
 
 
-def frames(count: int = LOOP, step_ms: float = STILL_MS / LOOP, key: bytes | None = None) -> list[bytes]:
+def frames(
+    count: int = LOOP, step_ms: float = STILL_MS / LOOP, key: bytes | None = None, workload: Workload = QUARTER
+) -> list[bytes]:
     """The first `count` frames; each advances the boot clock by `step_ms`. With a `key` (32 bytes) they are signed.
 
     Signed frames contain the current time. A receiver accepts them only once.
@@ -77,7 +103,7 @@ def frames(count: int = LOOP, step_ms: float = STILL_MS / LOOP, key: bytes | Non
         mav.signing.secret_key, mav.signing.sign_outgoing, mav.signing.link_id = key, True, 1
         mav.signing.timestamp = _signing_time()
     chance = random.Random(80)
-    order = _order()
+    order = _order(workload)
     made = []
     for i in range(count):
         message = _message(order[i % PATTERN], BOOT_MS + round(i * step_ms), chance)
@@ -86,10 +112,27 @@ def frames(count: int = LOOP, step_ms: float = STILL_MS / LOOP, key: bytes | Non
     return made
 
 
-def fleet(vehicles: int) -> list[bytes]:
-    """A loop of frames of many vehicles in turn; for one vehicle the frames of `frames`."""
-    one = frames(LOOP if vehicles == 1 else SHORT_LOOP)
-    return [_of_system(frame, system) for frame in one for system in range(1, vehicles + 1)]
+def fleet(vehicles: int, workload: Workload = QUARTER, *, in_step: bool = False) -> list[bytes]:
+    """A loop of frames of many vehicles in turn; for one vehicle the frames of `frames`.
+
+    Each vehicle is at another place of the loop, so their messages are due at different times, as those of real
+    vehicles. `in_step`: all vehicles send the same message at the same time.
+    """
+    if vehicles == 1:
+        return frames(LOOP, workload=workload)
+    one = frames(SHORT_LOOP, workload=workload)
+    chance = random.Random(vehicles)
+    phases = {system: 0 if in_step else chance.randrange(SHORT_LOOP) for system in range(1, vehicles + 1)}
+    return [_of_system(one[(i + phase) % SHORT_LOOP], system) for i in range(SHORT_LOOP)
+            for system, phase in phases.items()]  # fmt: skip
+
+
+def distinct() -> list[bytes]:
+    """A loop without two equal frames: a router drops a frame that it has just forwarded, as a copy or a loop.
+
+    It is longer than our memory of frames, so that none is remembered from the loop before.
+    """
+    return list(dict.fromkeys(frames(DISTINCT)))
 
 
 def chunks(made: list[bytes], size: int = 1400) -> list[bytes]:
@@ -98,12 +141,21 @@ def chunks(made: list[bytes], size: int = 1400) -> list[bytes]:
     return [stream[i : i + size] for i in range(0, len(stream), size)]
 
 
-def write_log(path: Path, count: int) -> None:
+def write_log(path: Path, count: int, workload: Workload = QUARTER) -> None:
     """Write a recorded log."""
-    start = 1_800_000_000_000_000
     with path.open("wb") as log:
-        for i, frame in enumerate(frames(count, step_ms=1000 / RATE)):
-            log.write((start + i * 1_000_000 // RATE).to_bytes(8, "big") + frame)
+        for i, frame in enumerate(frames(count, step_ms=1000 / RATE, workload=workload)):
+            log.write(_stamp(i) + frame)
+
+
+def write_long_log(path: Path, size: int, workload: Workload = HALF) -> None:
+    """Write a recorded log of at least `size` bytes, from one loop of frames over and over."""
+    loop = frames(workload=workload)
+    with path.open("wb") as log:
+        first = 0
+        while log.tell() < size:
+            log.write(b"".join(_stamp(first + i) + frame for i, frame in enumerate(loop)))
+            first += len(loop)
 
 
 def save(path: Path, made: list[bytes]) -> None:
@@ -121,9 +173,14 @@ def load(path: Path) -> Iterator[bytes]:
         at = end
 
 
-def _order() -> list[str]:
+def _stamp(number: int) -> bytes:
+    """The time of a frame in a recorded log."""
+    return (1_800_000_000_000_000 + number * 1_000_000 // RATE).to_bytes(8, "big")
+
+
+def _order(workload: Workload) -> list[str]:
     """The names of the messages of ten seconds. Each type is evenly spread."""
-    slots = [((i + 0.5) / number, kind) for kind, number in SENT.items() for i in range(number)]
+    slots = [((i + 0.5) / number, kind) for kind, number in workload.sent.items() for i in range(number)]
     return [kind for _, kind in sorted(slots)]
 
 
@@ -146,6 +203,12 @@ def _message(kind: str, boot_ms: int, chance: random.Random) -> Any:
 
 def _value(type_: str, chance: random.Random) -> float:
     return chance.uniform(-1, 1) if type_ in ("float", "double") else chance.randint(*RANGES[type_])
+
+
+def numbered(frame: bytes, sequence: int) -> bytes:
+    """The frame with another sequence number (0 to 255) and a new CRC."""
+    extra = CRC_EXTRA[int.from_bytes(frame[7:10], "little")]
+    return with_crc(frame[:4] + bytes([sequence]) + frame[5:-2], REVERSED[extra : extra + 1])
 
 
 def _of_system(frame: bytes, system: int) -> bytes:

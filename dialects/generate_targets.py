@@ -14,7 +14,7 @@ from pymavlink.generator import mavparse
 
 # For the ids in generate.UPSTREAM_CRC_EXTRA, from the message table of mavlink/mavlink's C library. The other ids there
 # have no target.
-UPSTREAM_TARGETS = {19: (4, 5), 80: (2, 3), 400: (4, 5), 401: (4, 5), 412: (4, 5), 413: (4, 5)}
+UPSTREAM_TARGETS = {19: (4, 5), 80: (2, 3), 400: (4, 5), 401: (4, 5)}
 
 HEADER = '''"""Where each message names its target.
 

@@ -128,9 +128,9 @@ def texts() -> Iterator[str]:
     for profile in AUTOPILOTS:
         if profile.texts.rules:
             yield f"### {profile.name}\n"
-            yield from table(("text", "effect"), ((f"`{r.pattern.pattern}`", _effect(r)) for r in profile.texts.rules))
+            yield from table(("text", "effect"), ((f"`{r.pattern}`", _effect(r)) for r in profile.texts.rules))
     yield "### All autopilots: texts that never count as unclassified\n"
-    yield from table(("text", "effect"), ((f"`{r.pattern.pattern}`", _effect(r)) for r in common.COMMON))
+    yield from table(("text", "effect"), ((f"`{r.pattern}`", _effect(r)) for r in common.COMMON))
 
 
 def _effect(rule: TextRule) -> str:

@@ -2,32 +2,34 @@
 
     .venv/bin/python docs/make_watch_screenshot.py [FILE]
 
-It uses no sockets, threads or clock, so it draws the same picture every time.
+It uses no sockets and no clock of the machine, so it draws the same picture every time.
 """
 
 from __future__ import annotations
 
-import io
+import asyncio
 import logging
+import os
 import re
 import sys
+import time
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
-from rich.console import Console
-from rich.text import Text
-
+from mav_robot_status.clock import Instant
 from mav_robot_status.config import Config
-from mav_robot_status.gateway.background import Rates, on_a_board
+from mav_robot_status.gateway.background import Rates, Row, on_a_board
 from mav_robot_status.gateway.replay import ReplayPipeline
 from mav_robot_status.hardware.mavlink.autopilots.wanted import COMMON, OUTPUT_WATCH
 from mav_robot_status.mavlink.framing import Parser
-from mav_robot_status.publishers.board import Board, BoardPublisher
+from mav_robot_status.publishers.board import Board, BoardPublisher, Transition
 from mav_robot_status.streams import NO_OUTPUT
 from mav_robot_status.testing import DEMO, ManualClock, arducopter, ardurover, px4, px4_vtol
 from mav_robot_status.testing.vehicle_model import VehicleModel
-from mav_robot_status.views.terminal.paint import STYLES
-from mav_robot_status.views.terminal.render import render
-from mav_robot_status.views.terminal.state import Logged, State, Ui, Vehicle
+from mav_robot_status.views.terminal.app import WatchApp
+from mav_robot_status.views.terminal.log_lines import LogLines
+from mav_robot_status.views.terminal.text import Signs
 
 FILE = Path(__file__).parent / "screenshots" / "watch.svg"
 SCENARIOS = (
@@ -39,69 +41,97 @@ SCENARIOS = (
     px4_vtol.TRANSITION,
     ardurover.PREARM_FAILING,
 )
-CHOSEN = 0
-SECONDS, TICK = 15.8, 0.02
-SIZE = 100, 28
+SECONDS, TICK, LOOKS = 15.8, 0.02, 0.5
+SIZE = 118, 34
+
+
+class Source:
+    """Plays the scenarios on a clock of its own."""
+
+    connection, advice, explained = "udp:127.0.0.1:14550", "", ""
+
+    def __init__(self) -> None:
+        self._clock = ManualClock()
+        self._pipeline = ReplayPipeline(on_a_board(Config()), NO_OUTPUT)
+        self._feeds = []
+        for number, scenario in enumerate(SCENARIOS, 1):
+            model = VehicleModel(scenario, self._clock.now().mono)
+            for wanted in (*COMMON, *OUTPUT_WATCH):  # the gateway requests missing messages
+                model.request(wanted.id, 1 / wanted.rate)
+            self._feeds.append((model, number, Parser(None), Rates()))
+
+    def play(self, seconds: float) -> None:
+        """Pass some time."""
+        for _ in range(round(seconds / TICK)):
+            now = self._clock.advance(TICK)
+            for model, number, parser, rates in self._feeds:
+                for outgoing in model.run(now):
+                    for frame in parser.feed(outgoing.frame(number)):
+                        self._pipeline.vehicles.take(frame, now)
+                        rates.take(frame.message_id, now.mono)
+            self._pipeline.tick(now)
+
+    @property
+    def board(self) -> Board:
+        """The statuses."""
+        return next(p.board for p in self._pipeline.publishers.values() if isinstance(p, BoardPublisher))
+
+    @property
+    def version(self) -> int:
+        """Of the board."""
+        return self.board.version
+
+    def now(self) -> Instant:
+        """The time of the story."""
+        return self._clock.now()
+
+    def wait(self, seconds: float) -> bool:
+        """It goes on."""
+        return False
+
+    def rows(self) -> list[Row]:
+        """One row for each vehicle."""
+        now, rates = self.now().mono, {number: rates for _, number, _, rates in self._feeds}
+        return [
+            Row(e.line, e.stamp, e.version, (e.heartbeat_age or 0.0) + now - e.at, rates[e.line["system"]].at(now))
+            for e in self.board
+        ]
+
+    def changes(self, handles: Iterable[str], most: int) -> list[tuple[str, Transition]]:
+        """The changes of these handles, the latest first."""
+        found = [(handle, change) for handle in handles for change in self.board.entries[handle].transitions]
+        return sorted(found, key=lambda named: -named[1].at)[:most]
+
+    def explanation(self) -> Mapping[str, Any] | None:
+        """The evidence of the selected handle."""
+        return self._pipeline.explain(self.explained, self.now())
 
 
 def main() -> None:
+    """Write the file."""
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else FILE
     path.parent.mkdir(exist_ok=True)
     logging.disable()
-    console = Console(record=True, width=SIZE[0], file=io.StringIO(), color_system="truecolor", force_terminal=True)
-    for line in render(play(), *SIZE):
-        console.print(Text.assemble(*((span.text, STYLES[span.style]) for span in line)), end="\n", no_wrap=True)
-    svg = console.export_svg(title="mav-robot-status watch udp:127.0.0.1:14550", unique_id="watch")
+    os.environ["TZ"] = "UTC"
+    time.tzset()
+    svg = asyncio.run(drawn(Source()))
     # the picture must not load fonts from the network
     svg = re.sub(r"@font-face \{.*?\}", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"terminal-\d+", "watch", svg)  # a number of each run
     path.write_text("".join(line.rstrip() + "\n" for line in svg.splitlines()), "utf-8")
 
 
-def play() -> State:
-    """The state of the screen after SECONDS."""
-    clock = ManualClock()
-    pipeline = ReplayPipeline(on_a_board(Config()), NO_OUTPUT)
-    board = next(p.board for p in pipeline.publishers.values() if isinstance(p, BoardPublisher))
-    feeds = []
-    for number, scenario in enumerate(SCENARIOS, 1):
-        model = VehicleModel(scenario, clock.now().mono)
-        for wanted in (*COMMON, *OUTPUT_WATCH):  # the gateway requests missing messages
-            model.request(wanted.id, 1 / wanted.rate)
-        feeds.append((model, number, Parser(None), Rates()))
-    log = []
-    for _ in range(round(SECONDS / TICK)):
-        now = clock.advance(TICK)
-        for model, number, parser, rates in feeds:
-            for outgoing in model.run(now):
-                for frame in parser.feed(outgoing.frame(number)):
-                    pipeline.vehicles.take(frame, now)
-                    rates.take(frame.message_id, now.mono)
-        lost = _lost(board)
-        pipeline.tick(now)
-        log += [
-            Logged(now.unix_us, f"lost vehicle {name}: no heartbeat for 3.5 s", True) for name in _lost(board) - lost
-        ]
-    now = clock.now()
-    vehicles = []
-    for entry, (_, _, _, rates) in zip(board, feeds, strict=True):
-        age = None if entry.heartbeat_age is None else entry.heartbeat_age + now.mono - entry.at
-        vehicles.append(Vehicle(entry.line, age, rates.at(now.mono)))
-    chosen = vehicles[CHOSEN]
-    changes = sorted(board.entries[chosen.handle].transitions, key=lambda transition: -transition.at)
-    return State(
-        "udp:127.0.0.1:14550",
-        now,
-        tuple(vehicles),
-        Ui(chosen.handle),
-        changes=tuple((chosen.name, transition) for transition in changes),
-        log=tuple(log),
-    )
-
-
-def _lost(board: Board) -> set[str]:
-    return {
-        f"{entry.line['system']}.{entry.line['component']}" for entry in board if entry.line["link"]["state"] == "LOST"
-    }
+async def drawn(source: Source) -> str:
+    """The screen at the end of the story, as SVG. It looks often: what was known before a loss is remembered."""
+    app = WatchApp(source, LogLines(), Signs())
+    async with app.run_test(size=SIZE) as pilot:
+        for _ in range(round(SECONDS / LOOKS)):
+            source.play(LOOKS)
+            app.look()
+        await pilot.pause()
+        app.refresh(repaint=True, layout=True)
+        await pilot.pause()
+        return app.export_screenshot(title="mav-robot-status watch udp:127.0.0.1:14550")
 
 
 if __name__ == "__main__":

@@ -125,6 +125,8 @@ class Sender:
 class World:
     """The senders, the air and the gateway. Each step is a method; `check` follows each."""
 
+    air: type[Air] = Air
+
     def __init__(self) -> None:
         self.now = START
         self.history: deque[str] = deque(maxlen=WORLD_STEPS + 1)
@@ -138,7 +140,7 @@ class World:
     def restart(self) -> None:
         """The gateway restarts. It knows nothing of before."""
         self._newest, self._armed_at = -1, -math.inf
-        with mock.patch("mav_robot_status.gateway.endpoint.open_guarded", Air):
+        with mock.patch("mav_robot_status.gateway.endpoint.open_guarded", self.air):
             config = Config(links=(LinkConfig("udpin:127.0.0.1:1"),), requests="none")
             self.hardware = MavlinkHardware(config, lambda: self.now)
         (endpoint,) = self.hardware.hub.endpoints

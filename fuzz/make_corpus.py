@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import random
 import struct
 from pathlib import Path
@@ -23,6 +24,17 @@ coalesce: 10 ms
 requests: none
 """
 """Configuration keys that the examples lack."""
+
+
+TABLE = b"""{"version": 2, "components": {"1": {"namespace": "px4",
+"enums": {"navigation_mode_group_t": {"type": "uint32_t", "is_bitfield": true, "entries": {"8": {"name": "mission"}}},
+"cause_t": {"type": "uint8_t", "entries": {"1": {"name": "rc", "description": "Sticks lost"}}}},
+"navigation_mode_groups": {"groups": {"3": [67371008]}},
+"event_groups": {"arming_check": {"events": {"7": {"name": "no_fix", "message": "GPS {3:.1m} has no fix",
+"description": "Wait. <profile name=\\"dev\\">See <param>EKF2_GPS_CHECK</param></profile>",
+"arguments": [{"type": "navigation_mode_group_t"}, {"type": "uint8_t"}, {"type": "float"}]}}},
+"default": {"events": {"8": {"message": "{1}", "arguments": [{"type": "px4::cause_t"}]}}}}}}}"""
+"""A table of PX4's events."""
 
 
 def write(target: str, entries: list[bytes]) -> None:
@@ -60,9 +72,17 @@ def main() -> None:
     write("messages", [b"".join(heartbeats), rng.randbytes(2000), b"".join(heartbeats[:9]) + rng.randbytes(600)])
     text = encode(Statustext(2, b"PreArm: Compass not calibrated", 7, 1), system=1, component=1, sequence=0)
     write("texts", [b"".join(bytes([20, 3, n % 4, n]) + text[10:30] for n in range(12)), rng.randbytes(500)])
+    write("event_table", [TABLE, lzma.compress(TABLE)])
+    write("events", [rng.randbytes(2000), rng.randbytes(500)])
+    opening = bytes([4, 1, 7, 0]) + (100).to_bytes(4, "little")
+    write("files", [opening * 3, opening + bytes([59, 1, 7, 0]) + bytes(60), opening + rng.randbytes(400)])
     write("configuration", [*(path.read_bytes() for path in sorted(EXAMPLES.glob("*.yaml"))), RARE])
     forms = [form for kind in KINDS for form in kind.forms.split()]
     write("routing", [b"one", b"two"])
+    pings = [struct.pack(f"{order}4i", 12, 1, 2, 0) for order in "<>"]
+    write(
+        "simple_message", [*pings, struct.pack("<15i", 56, 10, 2, 0, *range(11)), pings[0][:9] + b"\xff" * 9 + pings[0]]
+    )
     write("connection", [kind.example.encode() for kind in KINDS] + [form.encode() for form in forms])
 
 

@@ -12,13 +12,24 @@ from mav_robot_status.errors import ConfigError, UsageError
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
+from mav_robot_status.hardware.mavlink.px4_events import ARMING_SUMMARY, HEALTH_SUMMARY
+from mav_robot_status.hardware.mavlink.px4_events.ids import CAUSE_AT
+from mav_robot_status.hardware.mavlink.px4_events.parsing import TableError
+from mav_robot_status.hardware.mavlink.px4_events.parsing import parse as parse_table
 from mav_robot_status.hardware.mavlink.state import text_assembly
+from mav_robot_status.hardware.mavlink.state.event_sequence import ASKABLE, KEPT
 from mav_robot_status.links.url import parse
-from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
+from mav_robot_status.mavlink.definitions import MESSAGES, CurrentEventSequence, Event, Heartbeat, Statustext
 from mav_robot_status.mavlink.encode import enclose
 from mav_robot_status.mavlink.framing import CHECK, FIRST_CREDIT, Frame, Parser
+from mav_robot_status.mavlink.ftp.metadata import MOST_TABLE
+from mav_robot_status.mavlink.ftp.payload import ACK, NAK, OPCODES, PAYLOAD, Payload, unpack
+from mav_robot_status.mavlink.ftp.table_download import TableDownload
 from mav_robot_status.mavlink.signing import Signer, Verifier, is_signed
 from mav_robot_status.mavlink.wire import MAX_FRAME
+from mav_robot_status.publishers.simple_message.requests import RequestReader
+from mav_robot_status.simple_message import ORDERS
+from mav_robot_status.simple_message import SHORTEST as SHORTEST_REQUEST
 
 from .mutate import MOST_BYTES
 from .routing import World
@@ -29,6 +40,8 @@ PIECE: Final = 97
 """Bytes of one feed, so that feeds end anywhere within a frame."""
 KEY: Final = bytes(32)
 SOME: Final = sorted(WANTED_IDS)
+MOST_REQUESTS: Final = 200
+"""The most requests of a download after the last answer: it gives up long before."""
 LONGEST_LINE: Final = 2000
 """The most characters of an error message."""
 
@@ -120,6 +133,49 @@ def texts(data: bytes) -> int:
     return max(count, 1)
 
 
+def event_table(data: bytes) -> int:
+    """Any file of PX4's events: it is a table whose texts are lines, or the error is one line."""
+    try:
+        table = parse_table(data)
+    except TableError as error:
+        _one_line(error)
+        return 1
+    for number in table.events:
+        event = Event(number, 0, 0, 0, 0, 0, data[:40])
+        for text in (table.message(event), table.description(event)):
+            assert text is None or text.isprintable(), text
+    return 1
+
+
+def events(data: bytes) -> int:
+    """Any events of a PX4 in any order: nothing grows, and none of them takes the motion of an armed vehicle."""
+    hw = MavlinkRobotHW(HardwareOptions())
+    count = 0
+    for chunk in _chunks(bytes(80) + data):
+        count += 1
+        now = Instant(100 + count / 4, count * 250_000)
+        beat = Heartbeat(4 << 16, 2, 12, 209, 4, 3)
+        hw.take(Frame(0, (1, 1), count & 255, beat, b""), now)
+        hw.take(Frame(*_event(chunk, count), b""), now)
+        hw.read(now)
+        hw.due_requests(now)
+    (tracked,) = hw.vehicles
+    assert tracked.state is not None
+    assert len(tracked.state.events.events) <= KEPT
+    assert len(tracked.state.events.missing) <= ASKABLE
+    assert tracked.handle.status.drives_powered == 1
+    return count
+
+
+def _event(chunk: bytes, count: int) -> tuple[int, tuple[int, int], int, Event | CurrentEventSequence]:
+    """An event of a report, or a count, with a sequence number that is mostly near the last one."""
+    sequence = (count + chunk[0] % 8 - 4 if chunk[0] < 250 else chunk[1] << 8 | chunk[0]) & 0xFFFF
+    if chunk[1] % 8 == 0:
+        return 411, (1, 1), 0, CurrentEventSequence(sequence, chunk[2] // 250)
+    number = (ARMING_SUMMARY, HEALTH_SUMMARY, HEALTH_SUMMARY, *CAUSE_AT)[chunk[1] % 6]
+    return 410, (1, 1), 0, Event(number, count * 250, sequence, 0, 0, chunk[2], chunk[3:].ljust(40, b"\0")[:40])
+
+
 def configuration(data: bytes) -> int:
     """Any configuration file: it is valid, or the error is one line."""
     try:
@@ -145,11 +201,64 @@ def routing(data: bytes) -> int:
     return world.made
 
 
+def simple_message(data: bytes) -> int:
+    """Any bytes of a client, in pieces of any size: less than a header is held, and pieces make no difference.
+
+    A unit is a byte.
+    """
+    for order in ORDERS:
+        replies = RequestReader(order).feed(data)
+        for size in (1, 7, PIECE):
+            reader = RequestReader(order)
+            found = []
+            for start in range(0, len(data), size):
+                found.append(reader.feed(data[start : start + size]))
+                assert reader.pending < SHORTEST_REQUEST
+            assert b"".join(found) == replies
+        assert len(replies) <= len(data)
+    return max(len(data), 1)
+
+
 def _one_line(error: Exception) -> None:
     text = str(error)
     assert text, "the error has no message"
     assert "\n" not in text, text
     assert len(text) < LONGEST_LINE, len(text)
+
+
+def files(data: bytes) -> int:
+    """Any answers of a file server at any time: every request is one that only reads, and the download ends."""
+    download = TableDownload("mftp://etc/general", 0, 1, rate=(1000.0, 20_000.0)[len(data) % 2], now=0.0)
+    mono, count = 0.0, 0
+    asked = download.due(0.0)
+    for chunk in _chunks(data):
+        count += 1
+        mono += chunk[0] / 64
+        asked = download.due(mono) or asked
+        assert asked is not None
+        assert asked.opcode in OPCODES
+        download.heard(_answer(asked, chunk), mono)
+        arrived, size = download.progress
+        assert 0 <= arrived <= size <= MOST_TABLE
+    for _ in range(MOST_REQUESTS):
+        mono = max(mono, min(download.next_due(), mono + 3600))
+        download.due(mono)
+    assert download.ended
+    assert download.outcome is not None
+    return max(count, 1)
+
+
+def _answer(asked: Payload, chunk: bytes) -> Payload:
+    """An answer to a request: mostly one that fits."""
+    kind, ahead = chunk[1] % 8, chunk[2] % 4
+    answer = asked._replace(sequence=asked.sequence + 1 + ahead & 0xFFFF, opcode=ACK, req_opcode=asked.opcode)
+    if kind == 0:
+        answer = answer._replace(opcode=NAK)
+    elif kind == 1:
+        answer = answer._replace(offset=int.from_bytes(chunk[3:7], "little"), burst_complete=chunk[2] & 1)
+    elif kind == 2:
+        answer = unpack(chunk.ljust(PAYLOAD, b"\0")) or answer
+    return answer._replace(data=chunk[3:], size=len(chunk) - 3)
 
 
 TARGETS: Final[dict[str, Callable[[bytes], int]]] = {
@@ -158,15 +267,23 @@ TARGETS: Final[dict[str, Callable[[bytes], int]]] = {
     "messages": messages,
     "signing": signing,
     "texts": texts,
+    "event_table": event_table,
+    "events": events,
+    "files": files,
     "configuration": configuration,
     "connection": connection,
     "routing": routing,
+    "simple_message": simple_message,
 }
 UNITS: Final = {
     "work": "bytes",
+    "simple_message": "bytes",
     "configuration": "configurations",
     "connection": "connection strings",
     "texts": "chunks",
+    "event_table": "tables",
+    "events": "events",
+    "files": "answers",
 }
 
 assert set(SOME) <= set(MESSAGES)

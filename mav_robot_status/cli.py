@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import logging
 import os
 import signal
@@ -11,7 +10,7 @@ import sys
 import threading
 from typing import TYPE_CHECKING, NoReturn
 
-from .commands import COMMANDS, PROGRAM, command
+from .commands import COMMANDS, PROGRAM, command, importing
 from .errors import MavRobotStatusError, UsageError
 from .streams import StderrHandler, complain, detach, open_missing, writing
 from .version import __version__
@@ -23,6 +22,9 @@ if TYPE_CHECKING:
 class _Arguments(argparse.ArgumentParser):
     """Reports an error in one line. argparse would print all options first."""
 
+    words: Sequence[str] | None = None
+    """The arguments that will be read; None if they are not known."""
+
     def error(self, message: str) -> NoReturn:
         """Raises UsageError."""
         raise UsageError(f"{message}; see {self.prog} --help")
@@ -33,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     open_missing()
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        if not arguments or arguments[0] not in (*COMMANDS, "-h", "--help", "--version"):
+        if not arguments or arguments[0] not in (*COMMANDS, "-h", "--help", "-V", "--version"):
             _doubt_command(arguments[:1])
             arguments.insert(0, "run")
         if threading.current_thread() is threading.main_thread():
@@ -52,14 +54,19 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _doubt_command(first: Sequence[str]) -> None:
     """Raise UsageError if the first argument looks like a misspelt command."""
     for word in first:
+        if ":" in word or os.path.exists(word):  # a connection
+            continue
+        import difflib
+
         near = difflib.get_close_matches(word, COMMANDS, 1, 0.75)
-        if near and not os.path.exists(word):
+        if near:
             raise UsageError(f"there is no command '{word}'; did you mean '{near[0]}'?")
 
 
 def _run(arguments: list[str]) -> int:
     try:
-        options = _parser(arguments[0]).parse_args(arguments)
+        with importing():
+            options = _options(arguments)
         if "verbose" in options:
             _log_to_stderr(options)
         return command(options.command).run(options)
@@ -68,20 +75,32 @@ def _run(arguments: list[str]) -> int:
             sys.stdout.flush()  # here, where a closed pipe can be handled
 
 
-def _parser(asked: str) -> argparse.ArgumentParser:
-    """The help lists every command. Only the given command gets its arguments."""
+def _options(arguments: list[str]) -> argparse.Namespace:
+    """The arguments, read. Only the given command is imported and declares its arguments."""
+    if arguments[0] not in COMMANDS:
+        return _parser().parse_args(arguments)
+    from .commands.options import Help
+
+    name = arguments[0]
+    parser = _Arguments(prog=f"{PROGRAM} {name}", formatter_class=Help)
+    parser.words = arguments[1:]
+    command(name).arguments(parser)
+    return parser.parse_args(arguments[1:], argparse.Namespace(command=name))
+
+
+def _parser() -> argparse.ArgumentParser:
+    """The parser of the help that lists every command, and of the version."""
     parser = _Arguments(
         prog=PROGRAM,
         description="RobotStatus of MAVLink vehicles: can it move, who is in charge, and if it cannot move, why? "
         "The status is information, not a safety function.",
-        epilog="The command `run` may be left out.",
+        epilog="The command `run` may be left out. If there is no status, `mav-robot-status doctor CONNECTION` names "
+        "the cause and the next step.",
     )
-    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    parser.add_argument("-V", "--version", action="version", version=f"{PROGRAM} {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, words in COMMANDS.items():
-        of_command = commands.add_parser(name, help=words)
-        if name == asked:
-            command(name).arguments(of_command)
+        commands.add_parser(name, help=words)
     return parser
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from datetime import datetime, timezone
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
+
+from .values import NamedTuple
 
 FIRST_SECOND: Final = 0
 LAST_SECOND: Final = 253_402_300_799  # 9999-12-31T23:59:59Z

@@ -32,12 +32,14 @@ RETRY: Final = 0.02  # s until a busy publisher is tried again
 class _Output:
     """One publisher, and what was published to it."""
 
-    __slots__ = ("changes", "last", "publisher", "sent", "skipped", "waiting")
+    __slots__ = ("changes", "due", "last", "publisher", "sent", "skipped", "waiting")
 
-    def __init__(self, publisher: Publisher, start: float) -> None:
+    def __init__(self, publisher: Publisher, start: float, rate: float) -> None:
         self.publisher = publisher
         self.last = start
         """When the last periodic message was due; it keeps the phase."""
+        self.due = _strictly_after(start, rate)
+        """When the next one is due; inf at a rate of 0 or less."""
         self.sent: tuple[RobotStatus, Detail] | None = None
         self.changes: deque[float] = deque(maxlen=MOST_CHANGES)
         self.waiting = False
@@ -54,6 +56,8 @@ class IndustrialRobotStatusController:
         self.handle: IndustrialRobotStatusHandle
         self._publishers: Sequence[Publisher] = ()
         self._outputs: list[_Output] = []
+        self._sent: tuple[RobotStatus, Detail] | None = None
+        """What the handle held at the last update."""
 
     def init(self, hw: InterfaceManager, parameters: Mapping[str, object], publishers: Sequence[Publisher]) -> None:
         """Read the parameters and find the handle. The log names each default that is used.
@@ -80,7 +84,7 @@ class IndustrialRobotStatusController:
 
     def starting(self, time: Instant) -> None:
         """Start publishing. The first periodic message is due one period after `time`."""
-        self._outputs = [_Output(publisher, time.mono) for publisher in self._publishers]
+        self._outputs = [_Output(publisher, time.mono, self.publish_rate) for publisher in self._publishers]
 
     def update(self, time: Instant, period: float) -> None:
         """Publish what is due at `time`. `period` (seconds since the last update) is ros_control's; it is not used.
@@ -89,17 +93,13 @@ class IndustrialRobotStatusController:
         not move the periodic phase.
         """
         handle = self.handle
-        now = time.mono
+        status, detail, now = handle.status, handle.detail, time.mono
+        if self._sent is None or self._sent[0] is not status or self._sent[1] is not detail:
+            self._sent = status, detail
         msg: RobotStatusMsg | None = None
         for output in self._outputs:
-            sent = output.sent
-            changed = self.publish_on_change and (
-                sent is None
-                or (sent[0] is not handle.status and sent[0] != handle.status)
-                or (sent[1] is not handle.detail and sent[1] != handle.detail)
-            )
-            due = self._is_due(output, now)
-            if not due and not (changed and self._may_change(output, now)):
+            due = now >= output.due and output.publisher.periodic
+            if not due and not (self._has_changed(output) and self._may_change(output, now)):
                 continue
             if output.publisher.busy():
                 # ORIGINAL: skips a busy publisher too, but does not count it.
@@ -113,8 +113,8 @@ class IndustrialRobotStatusController:
                 output.changes.append(now)
             if msg is None:
                 age = None if handle.heard_at is None else now - handle.heard_at
-                msg = RobotStatusMsg(handle.name, time.unix_us, handle.status, handle.detail, age)
-            output.sent = (handle.status, handle.detail)
+                msg = RobotStatusMsg(handle.name, time.unix_us, status, detail, age)
+            output.sent = self._sent
             output.publisher.publish(msg)
 
     def stopping(self, time: Instant) -> None:
@@ -134,31 +134,46 @@ class IndustrialRobotStatusController:
         The gateway calls this after each `update`, and calls `update` again at that time or when the handle changes.
         """
         due = math.inf
+        last, handle = self._sent, self.handle
+        if last is not None and (last[0] is not handle.status or last[1] is not handle.detail):
+            last = None
         for output in self._outputs:
-            if self.publish_rate > 0 and output.publisher.periodic:
-                # strictly later than due, see _is_due
-                due = min(due, math.nextafter(output.last + 1 / self.publish_rate, math.inf))
-            if self.publish_on_change and output.sent != (self.handle.status, self.handle.detail):
+            if output.due < due and output.publisher.periodic:
+                due = output.due
+            if (output.sent is not last or last is None) and self._has_changed(output):
                 full = len(output.changes) == MOST_CHANGES
                 due = min(due, output.changes[0] + WINDOW if full else now)
         return max(due, now + RETRY) if due <= now else due
 
-    def _is_due(self, output: _Output, now: float) -> bool:
-        """Strictly later than a period after the last periodic message; never at a rate of 0 or less."""
-        rate = self.publish_rate
-        return rate > 0 and output.publisher.periodic and output.last + 1 / rate < now
+    def _has_changed(self, output: _Output) -> bool:
+        """Whether a change waits to be published."""
+        if not self.publish_on_change:
+            return False
+        sent, handle = output.sent, self.handle
+        if sent is None:
+            return True
+        status, detail = sent  # mostly the same values, and then not compared
+        return (status is not handle.status and status != handle.status) or (
+            detail is not handle.detail and detail != handle.detail
+        )
 
     def _keep_phase(self, output: _Output, now: float) -> None:
         """The next period begins where this one was due, not where it was published."""
         period = 1 / self.publish_rate
-        output.last += period
+        output.last = last = output.last + period
         # ORIGINAL: advances by one period only, so a burst of all missed messages follows a stall.
-        if output.last + period < now:
-            output.last = now - math.fmod(now - output.last, period)
+        if last + period < now:
+            output.last = last = now - math.fmod(now - last, period)
+        output.due = math.nextafter(last + period, math.inf)
 
     def _may_change(self, output: _Output, now: float) -> bool:
         changes = output.changes
         return len(changes) < MOST_CHANGES or now >= changes[0] + WINDOW
+
+
+def _strictly_after(last: float, rate: float) -> float:
+    """The first time that is strictly later than a period after `last`; never at a rate of 0 or less."""
+    return math.nextafter(last + 1 / rate, math.inf) if rate > 0 else math.inf
 
 
 def _number(rate: object) -> float:

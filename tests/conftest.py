@@ -7,7 +7,9 @@ import os
 import pytest
 from hypothesis import HealthCheck, settings
 
-PER_CORE = 2
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else every command that a test starts compiles the package again
+
+PER_CORE = 3
 """Workers for each core: most system tests wait for another process."""
 
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])

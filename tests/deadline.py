@@ -24,7 +24,7 @@ T = TypeVar("T")
 SOON = 10.0
 """Seconds on an idle machine for anything that should happen at once."""
 
-REFERENCE = 0.2
+REFERENCE = 0.15
 """Seconds that `START` takes on two idle cores."""
 
 _EXAMPLE = Path(__file__).parents[1] / "config" / "one_vehicle_udp.yaml"

@@ -19,7 +19,7 @@ SETTLED = 50_000
 
 def measure(bench: Bench) -> Found:
     """One round."""
-    frames = LONG if bench.long else round(bench.lasting(FRAMES))
+    frames = LONG if bench.long else bench.number(FRAMES)
     starts = {OURS: bench.contenders.start_ours, PYMAVLINK: bench.contenders.start_pymavlink}
     for who, start in starts.items():
         port = free_port()
@@ -27,6 +27,8 @@ def measure(bench: Bench) -> Found:
             child.listens(port)
             feed.send(RATE, bench.lasting(MINUTE / RATE))
             yield Sample(SETUP, AFTER, who, child.memory())
+            if bench.quick and who != OURS:
+                continue
             feed.send(FAST, SETTLED / FAST)
             before = child.memory()
             fed = feed.measure(child, FAST, frames / FAST)

@@ -10,8 +10,10 @@ from ..case import Bench, Case, Found
 from ..contenders import PEERS
 from ..process import ROOT, BenchError
 from ..results import OURS, PYMAVLINK, Sample, Target
+from ..workload import WORKLOADS
 
-SIZES = {"chunks of 1400 bytes": 1400, "frame by frame": 0}
+CHUNKS, FRAMES = "chunks of 1400 bytes", "frame by frame"
+SIZES = {CHUNKS: 1400, FRAMES: 0}
 METRIC = "CPU per frame, us"
 
 
@@ -25,16 +27,29 @@ def job(name: str, path: object, size: int = 0) -> float:
     return float(found["seconds"] * 1e6 / found["frames"])
 
 
+def speed(bench: Bench) -> float:
+    """The speed of this machine: microseconds in which pymavlink parses a frame. Absolute limits depend on it."""
+    return job(f"parse-{PYMAVLINK}", bench.frames(), SIZES[CHUNKS])
+
+
 def measure(bench: Bench) -> Found:
     """One round."""
-    for setup, size in SIZES.items():
-        for who in (OURS, PYMAVLINK):
-            yield Sample(setup, METRIC, who, job(f"parse-{who}", bench.frames(), size))
+    for traffic in WORKLOADS:
+        for words, size in SIZES.items():
+            for who in (OURS, PYMAVLINK):
+                value = job(f"parse-{who}", bench.frames(traffic=traffic), size)
+                yield Sample(f"{words}, {traffic.name}", METRIC, who, value)
 
 
 CASE = Case(
     "parse",
     "Parsing from memory",
     measure,
-    (Target("chunks of 1400 bytes", METRIC, "parsing: at most 1/9 of pymavlink's CPU", 1 / 9, peer=PYMAVLINK),),
-)
+    tuple(
+        Target(
+            f"{CHUNKS}, {traffic.name}", METRIC, f"parsing, {traffic.name}: at most 1/9 of pymavlink's CPU", 1 / 9,
+            peer=PYMAVLINK,
+        )
+        for traffic in WORKLOADS
+    ),
+)  # fmt: skip

@@ -32,17 +32,17 @@ def measure(bench: Bench) -> Found:
 
 
 def _one(bench: Bench, setup: str, who: str, arguments: tuple[str, ...]) -> Found:
-    seconds = bench.lasting(SECONDS)
+    seconds, before = bench.lasting(SECONDS), bench.lasting(1.0)
     # a receiver accepts a signed frame only once, so the file has one for every frame that is sent
     frames = bench.place / "signed.frames"
     if setup == SIGNED:
-        workload.save(frames, workload.frames(round(RATE * (seconds + 1)), key=KEY))
+        workload.save(frames, workload.frames(round(RATE * (seconds + before)) + 1, key=KEY))
     start = bench.contenders.start_ours if who == OURS else bench.contenders.start_pymavlink
     port = free_port()
     path = frames if setup == SIGNED else bench.frames()
     with start(port, *arguments) as child, Feed(path, port) as feed:
         child.listens(port)
-        feed.warm_up(RATE, 1.0)
+        feed.warm_up(RATE, before)
         fed = feed.measure(child, RATE, seconds)
         yield Sample(setup, METRIC, who, fed.per_frame, fed.note)
 

@@ -1,6 +1,6 @@
 """CPU time of a job that reads from memory, as JSON. Arguments: JOB FILE SIZE. Imports and times only that job.
 
-Jobs: parse frames of a file of `workload.save`, in pieces of SIZE bytes (0: frame by frame); or replay a log.
+Jobs: parse frames of a file of `workload.save`, in pieces of SIZE bytes (0: frame by frame); or read a log.
 """
 
 from __future__ import annotations
@@ -92,11 +92,31 @@ def replay_pymavlink(_: list[bytes], path: str) -> Callable[[], int]:
     return run
 
 
+def replay_typed(_: list[bytes], path: str) -> Callable[[], int]:
+    """mavutil asked for the messages that a status needs. It builds an index of the log, then reads only these."""
+    os.environ["MAVLINK20"] = "1"
+    from pymavlink import mavutil
+
+    from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+    from mav_robot_status.mavlink.definitions import MESSAGES
+
+    kinds = [MESSAGES[i].name for i in WANTED_IDS]
+
+    def run() -> int:
+        log = mavutil.mavlink_connection(path, dialect="ardupilotmega")
+        while log.recv_match(type=kinds) is not None:
+            pass
+        return sum(log.counts.values())
+
+    return run
+
+
 JOBS: Final[dict[str, Callable[[list[bytes], str], Callable[[], int]]]] = {
     "parse-ours": parse_ours,
     "parse-pymavlink": parse_pymavlink,
     "replay-ours": replay_ours,
     "replay-pymavlink": replay_pymavlink,
+    "replay-typed": replay_typed,
 }
 
 

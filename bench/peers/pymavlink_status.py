@@ -1,4 +1,7 @@
-"""UDP to JSON lines with pymavlink, as users write it: `recv_match` in a loop. Arguments: PORT [RATE [KEY]]."""
+"""UDP to JSON lines with pymavlink, as users write it: `recv_match` in a loop. Arguments: PORT [RATE [KEY|any]].
+
+`recv_match` gets the types of the messages that it needs; with `any` it returns all messages.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +24,15 @@ def main() -> None:
     """Run until stopped."""
     rate = float(sys.argv[2]) if len(sys.argv) > 2 else 10.0
     link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{sys.argv[1]}", dialect="ardupilotmega")
-    if len(sys.argv) > 3:
-        link.setup_signing(bytes.fromhex(sys.argv[3]))
+    third = sys.argv[3] if len(sys.argv) > 3 else ""
+    kinds = None if third == "any" else KINDS
+    if third and kinds:
+        link.setup_signing(bytes.fromhex(third))
     status: dict[str, Any] = {"armed": None, "state": None, "faults": 0, "moving": None, "text": None}
     due = time.monotonic()
     while True:
         wait = max(0.0, due - time.monotonic()) if rate else 1.0
-        message = link.recv_match(type=KINDS, blocking=True, timeout=wait)
+        message = link.recv_match(type=kinds, blocking=True, timeout=wait)
         armed = status["armed"]
         if message is not None:
             _update(status, message)

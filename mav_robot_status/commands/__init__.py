@@ -1,29 +1,34 @@
 """The subcommands: a row of `COMMANDS` and a module of the same name for each.
 
 The module of a command is imported only for that command, and it imports what it needs when it runs. `options` has the
-arguments that several commands share; `overrides` applies them to the configuration.
+arguments that several commands share; `overrides` and `arms` apply them to the configuration.
 """
 
 from __future__ import annotations
 
+import gc
+from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Iterator
 
 PROGRAM: Final = "mav-robot-status"
 COMMANDS: Final = {
     "run": "publish the statuses of all vehicles heard, as JSON lines and as MAVLink (the default)",
     "explain": "show each field with its value, the rule, the message that it read and its age",
-    "doctor": "find out why there is no status, and what to do next",
+    "doctor": "find out why there is no status, and name the next step",
     "report": "draw recorded logs as one self-contained HTML file",
-    "watch": "show a live table in the terminal; press ? for the keys",
+    "watch": "show a live table in the terminal",
     "board": "show all robots of an MQTT broker on one web page",
-    "demo": "run a fake autopilot and the gateway in one process; about 30 s",
+    "demo": "show fake vehicles and the gateway in one process, without any vehicle",
     "check-config": "explain a configuration, or show where its error is",
     "dialect": "write the dialect's XML, and a Lua dissector for Wireshark",
+    "px4-events": "read the table of its events from a PX4, for `--px4-events`",
     "applet": "write the Lua script with which an ArduPilot reports its emergency stop",
+    "completion": "write a script with which bash, zsh or fish completes the command line",
 }
 """Every command with its help line, in the order of the help."""
 
@@ -36,6 +41,17 @@ class Command(Protocol):
 
     def run(self, options: argparse.Namespace) -> int:
         """Run the command and return its exit code. Raises MavRobotStatusError."""
+
+
+@contextmanager
+def importing() -> Iterator[None]:
+    """While modules are imported: without the garbage collector. It would search what stays anyway."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def command(name: str) -> Command:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..links.url import parse
+from ..publishers.ros.options import Ros2Options
 from ..streams import say
-from .options import connections, looking, seconds
+from .options import connections, given, looking, publisher, seconds
 from .overrides import configured
 
 if TYPE_CHECKING:
@@ -20,11 +21,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--seconds", type=seconds, metavar="S", default=5.0, help="listen so long, from the first heartbeat on (5)"
     )
     parser.add_argument("--as-json", action="store_true", help="as JSON, one object for each connection")
+    publisher(parser, Ros2Options)
     looking(parser, "never send anything on the connections")
 
 
 def run(options: argparse.Namespace) -> int:
-    """0: every connection has a status; 1: one lacks it."""
+    """0: every connection and every arm has a status, and its ROS 2 topics can be had; 1: one lacks it."""
+    from ..diagnosis.doctor.arm_diagnosis import arm_as_json, arm_as_text
+    from ..diagnosis.doctor.arms import examine_arm
     from ..diagnosis.doctor.listen import examine
     from ..diagnosis.doctor.rendering import as_json, as_text
 
@@ -36,4 +40,21 @@ def run(options: argparse.Namespace) -> int:
         found, diagnosis = examine(config, link, options.seconds)
         ok = ok and diagnosis.ok
         say(*([as_json(found, diagnosis)] if options.as_json else as_text(found, diagnosis)))
+    for interface in config.interfaces:
+        arm, diagnosis = examine_arm(config, interface, options.seconds)
+        ok = ok and diagnosis.ok
+        say(*([arm_as_json(arm, diagnosis)] if options.as_json else arm_as_text(arm, diagnosis)))
+    if options.ros2 is not None:
+        ok = _ros2(options) and ok
     return 0 if ok else 1
+
+
+def _ros2(options: argparse.Namespace) -> bool:
+    """Whether the ROS 2 topics can be had."""
+    from ..diagnosis.doctor.ros2 import as_json, as_text, diagnose, examine
+    from ..publishers.ros.settings import read
+
+    found = examine(read(given(options, Ros2Options)))
+    diagnosis = diagnose(found)
+    say(*([as_json(options.ros2, found, diagnosis)] if options.as_json else as_text(found, diagnosis)))
+    return diagnosis.ok

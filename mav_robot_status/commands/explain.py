@@ -30,12 +30,15 @@ def run(options: argparse.Namespace) -> int:
     config = configured(options)
     urls = [parse(link.url) for link in config.links]
     if len(urls) == 1 and urls[0].kind.is_log:
+        if options.arm:
+            raise UsageError(f"{urls[0].text}: a recorded log has no arm: explain it without --arm")
         found = explain_log(config, urls[0].device, options.at)
     elif options.at is not None:
         raise UsageError("--at is a moment of a recorded log; a live connection is explained now")
     else:
         found = explain_live(config, sys.stdout)
     if not found:
-        raise NothingHeardError("no autopilot was heard, so there is nothing to explain")
+        who = "no robot" if config.interfaces else "no autopilot"
+        raise NothingHeardError(f"{who} was heard, so there is nothing to explain")
     say(*(as_json(found) if options.as_json else as_table(found)))
     return 0

@@ -7,20 +7,54 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-from typing import TYPE_CHECKING, Any
+import os
+import re
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
+from ..config.model import LONGEST_NAME, is_vehicle_name
 from ..links.url import help_text
 
 if TYPE_CHECKING:
-    from collections.abc import Container
+    from collections.abc import Container, Iterable
 
     from ..interface import Options
+
+_NAMED: Final = re.compile(r"([0-9]{1,3})(?:\.([0-9]{1,3}))?=(.*)", re.ASCII | re.DOTALL)
+
+WITH_ARGUMENTS: Final = {
+    "http": (("--http", "--alarm"), "publishers.web.options", "HttpOptions"),
+    "mqtt": (("--mqtt",), "publishers.mqtt.options", "MqttOptions"),
+    "simple_message": (("--simple-message",), "publishers.simple_message.options", "SimpleMessageOptions"),
+    "ros2": (("--ros2",), "publishers.ros.options", "Ros2Options"),
+}
+"""The publishers that the command line adds: how their flags begin, that which enables it first; and the declaration of
+their options."""
 
 FORMS = "forms"
 """A placeholder in a parser for the connection forms: finding every kind of link scans the installed packages."""
 
 
-class ConnectionHelp(argparse.RawDescriptionHelpFormatter):
+class Help(argparse.HelpFormatter):
+    """As wide as the terminal. argparse makes one for each argument, and imports all compressors to find the width."""
+
+    def __init__(self, prog: str, **options: Any) -> None:
+        options.setdefault("width", _columns() - 2)
+        super().__init__(prog, **options)
+
+
+def _columns() -> int:
+    """The width of the terminal, as `shutil` has it."""
+    with contextlib.suppress(KeyError, ValueError):
+        if (columns := int(os.environ["COLUMNS"])) > 0:
+            return columns
+    with contextlib.suppress(AttributeError, ValueError, OSError):
+        return os.get_terminal_size(sys.__stdout__.fileno()).columns or 80  # type: ignore[union-attr]
+    return 80
+
+
+class ConnectionHelp(Help, argparse.RawDescriptionHelpFormatter):
     """Writes the forms of a connection at the end of the help."""
 
     def add_text(self, text: str | None) -> None:
@@ -38,10 +72,30 @@ def looking(parser: argparse.ArgumentParser, passive: str = "never send on the v
     """The other arguments of a command that reads vehicles and publishes nothing."""
     parser.add_argument("--config", metavar="FILE", help="configuration (YAML)")
     parser.add_argument("--system", type=system, metavar="N", help="only the vehicle with this system id")
+    names(parser)
     parser.add_argument("--baud", type=baud, metavar="N", help="baud rate of serial connections (57600)")
     parser.add_argument("--signing-key", metavar="FILE", help="accept only frames signed with this key")
+    px4_events(parser)
     parser.add_argument("--passive", action="store_true", help=passive)
+    arms(parser)
     verbosity(parser)
+
+
+def names(parser: argparse.ArgumentParser) -> None:
+    """The names of vehicles."""
+    words = "name a vehicle, for people: 1=Rover-A, or 1.2=Arm for one component; repeatable"
+    parser.add_argument("--name", action="append", type=named, metavar="SYSTEM=NAME", help=words)
+
+
+def px4_events(parser: argparse.ArgumentParser) -> None:
+    """The words for the events of PX4."""
+    parser.add_argument("--px4-events", metavar="FILE", help="PX4's table of events, all_events.json or .json.xz")
+
+
+def arms(parser: argparse.ArgumentParser) -> None:
+    """The arms beside the vehicles."""
+    words = "an arm beside the vehicle: ur:HOST[:PORT] or simple_message:HOST[:PORT]; repeatable"
+    parser.add_argument("--arm", action="append", metavar="TYPE:HOST", help=words)
 
 
 def publisher(parser: argparse.ArgumentParser, options: type[Options], without: Container[str] = ()) -> None:
@@ -55,6 +109,37 @@ def publisher(parser: argparse.ArgumentParser, options: type[Options], without: 
             convert = float if kind is float else str
             choices = option.choices or None
             parser.add_argument(option.flag, type=convert, metavar=option.metavar, choices=choices, help=option.help)
+
+
+def publishers(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the publishers in WITH_ARGUMENTS that the given ones may name: the first flag enables each.
+
+    A declaration takes a hundredth of the start of a gateway.
+    """
+    words = getattr(parser, "words", None)
+    for kind, (flags, _, _) in WITH_ARGUMENTS.items():
+        if words is None or any(may_name(flag, words) for flag in flags):
+            publisher(parser, options_of(kind))
+
+
+def options_of(kind: str) -> type[Options]:
+    """The options of a publisher in WITH_ARGUMENTS."""
+    _, module, name = WITH_ARGUMENTS[kind]
+    found: type[Options] = getattr(import_module(f"...{module}", __name__), name)
+    return found
+
+
+def may_name(flag: str, words: Iterable[str]) -> bool:
+    """Whether one of these arguments may be a flag that begins with `flag`, cut short or not; or asks for the help."""
+    for word in words:
+        name = word.partition("=")[0]
+        if name[:1] != "-":
+            continue
+        if name.startswith(flag) or flag.startswith(name) or "--help".startswith(name):
+            return True
+        if name[:2] != "--" and "h" in name:  # -qh
+            return True
+    return False
 
 
 def given(options: argparse.Namespace, declared: type[Options]) -> dict[str, object]:
@@ -102,6 +187,16 @@ def gap(text: str) -> float:
 def system(text: str) -> int:
     """A MAVLink system id, 1 to 255."""
     return _number(text, "a system id", 255)
+
+
+def named(text: str) -> tuple[tuple[int, int | None], str]:
+    """The ids and the name of a vehicle. None: each autopilot of the system."""
+    found = _NAMED.fullmatch(text)
+    if found is None or not all(1 <= int(one) <= 255 for one in found.groups()[:2] if one is not None):
+        raise argparse.ArgumentTypeError(f"{text!r} is not SYSTEM=NAME; write for example 1=Rover-A, or 1.2=Arm")
+    if not is_vehicle_name(found[3]):
+        raise argparse.ArgumentTypeError(f"{text!r}: a name has 1 to {LONGEST_NAME} printable characters")
+    return (int(found[1]), None if found[2] is None else int(found[2])), found[3]
 
 
 def baud(text: str) -> int:

@@ -4,36 +4,49 @@ from __future__ import annotations
 
 import dataclasses
 from argparse import Namespace
+from collections.abc import Sequence
 from typing import Final
 
 from ..config import Config, ControllerConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
 from ..config import load as load_config
 from ..errors import UsageError
-from ..interface import DEFAULT_HANDLE_NAME, Options
+from ..interface import DEFAULT_HANDLE_NAME
 from ..links.url import parse
 from ..publishers.json_lines import JsonOptions
-from ..publishers.mqtt.options import MqttOptions
-from ..publishers.web.options import HttpOptions
 from . import PROGRAM
-from .options import given, value_of
+from .arms import with_arms
+from .options import WITH_ARGUMENTS, given, options_of, value_of
 
-WITH_ARGUMENTS: Final[dict[str, type[Options]]] = {"http": HttpOptions, "mqtt": MqttOptions}
-"""The publishers that the command line adds: each replaces the publishers of its type in the configuration."""
-
-
-BESIDE_MAVLINK: Final = ("run", "watch", "explain")
+BESIDE_MAVLINK: Final = ("run", "watch", "explain", "doctor")
 """Commands that need no connection if the configuration has a hardware interface other than MAVLink."""
 
 
 def loaded(options: Namespace) -> Config:
-    """The configuration of the file, or the default one. Raises ConfigError."""
-    return load_config(options.config) if options.config else Config()
+    """The configuration of the file, or the default one, with names and PX4's table of events. Raises ConfigError."""
+    config = load_config(options.config) if options.config else Config()
+    if names := value_of(options, "--name"):
+        config = dataclasses.replace(config, names={**config.names, **_once(names)})
+    table = value_of(options, "--px4-events")
+    if table is None:
+        return config
+    return dataclasses.replace(config, hardware=dataclasses.replace(config.hardware, px4_events=table))
+
+
+def _once(names: Sequence[tuple[tuple[int, int | None], str]]) -> dict[tuple[int, int | None], str]:
+    """The names of the command line by ids. Raises UsageError if a vehicle has two."""
+    found = dict(names)
+    for (system, component), name in names:
+        if found[system, component] != name:
+            who = f"{system}" if component is None else f"{system}.{component}"
+            raise UsageError(f"--name {who}= is there twice: one vehicle has one name")
+    return found
 
 
 def configured(options: Namespace) -> Config:
     """The configuration of a command that needs connections, overridden. Raises UsageError if there are none."""
-    config = overridden(loaded(options), options)
-    if not config.links and not (config.interfaces and options.command in BESIDE_MAVLINK):
+    config = with_arms(overridden(loaded(options), options), value_of(options, "--arm") or ())
+    asks_ros2 = options.command == "doctor" and options.ros2 is not None
+    if not config.links and not asks_ros2 and not (config.interfaces and options.command in BESIDE_MAVLINK):
         asked = PROGRAM if options.command == "run" else f"{PROGRAM} {options.command}"
         raise UsageError(f"no connection given; write for example {asked} udp:127.0.0.1:14550")
     return config
@@ -44,7 +57,7 @@ def overridden(config: Config, options: Namespace) -> Config:
     if options.system is not None:
         config = only(config, options.system)
     controllers = _controllers(config, options)
-    for kind in WITH_ARGUMENTS:
+    for kind in sorted(WITH_ARGUMENTS):
         controllers = with_publisher(kind, controllers, options)
     record = value_of(options, "--record")
     max_gap = value_of(options, "--max-gap")
@@ -57,6 +70,7 @@ def overridden(config: Config, options: Namespace) -> Config:
         record=config.record if record is None else record,
         max_gap=config.max_gap if max_gap is None else max_gap,
         forward=config.forward or bool(value_of(options, "--forward")),
+        kernel_filter=False if value_of(options, "--no-kernel-filter") else config.kernel_filter,
     )
 
 
@@ -77,8 +91,12 @@ def with_publisher(
 
     The first flag of its options enables it. Raises UsageError for another of its flags without the first.
     """
-    first, *others = (one.option for one in WITH_ARGUMENTS[kind].declared() if one.option.flag is not None)
-    asked = given(options, WITH_ARGUMENTS[kind])
+    enables = WITH_ARGUMENTS[kind][0][0].strip("-").replace("-", "_")
+    if not hasattr(options, enables):  # none of its arguments is there
+        return controllers
+    declaration = options_of(kind)
+    first, *others = (one.option for one in declaration.declared() if one.option.flag is not None)
+    asked = given(options, declaration)
     if value_of(options, str(first.flag)) is not None:
         return _with(controllers, PublisherConfig(kind, asked))
     for option in others:

@@ -12,7 +12,7 @@ from ..errors import NothingHeardError
 from ..streams import say
 from ..version import __version__
 from . import PROGRAM
-from .options import system, verbosity
+from .options import names, px4_events, system, verbosity
 from .overrides import loaded, only
 
 if TYPE_CHECKING:
@@ -28,7 +28,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="FILE.html", help="where to write (the log's name with .html, here)")
     parser.add_argument("--as-json", action="store_true", help="totals and intervals as JSON instead, or besides -o")
     parser.add_argument("--config", metavar="FILE", help="configuration (YAML)")
+    px4_events(parser)
     parser.add_argument("--system", type=system, metavar="N", help="only the vehicle with this system id")
+    names(parser)
     verbosity(parser)
 
 

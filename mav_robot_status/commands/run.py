@@ -8,10 +8,21 @@ from typing import TYPE_CHECKING
 from ..errors import UsageError
 from ..links.url import parse
 from ..publishers.json_lines import JsonOptions
-from ..publishers.mqtt.options import MqttOptions
-from ..publishers.web.options import HttpOptions
-from . import PROGRAM
-from .options import baud, connections, gap, publisher, rate, system, value_of, verbosity
+from . import PROGRAM, importing
+from .options import (
+    arms,
+    baud,
+    connections,
+    gap,
+    names,
+    publisher,
+    publishers,
+    px4_events,
+    rate,
+    system,
+    value_of,
+    verbosity,
+)
 from .overrides import configured
 
 if TYPE_CHECKING:
@@ -28,13 +39,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rate", type=rate, metavar="HZ", help="publish_rate of the controllers (10)")
     publisher(parser, JsonOptions)
     parser.add_argument("--system", type=system, metavar="N", help="only the vehicle with this system id")
+    names(parser)
     parser.add_argument("--baud", type=baud, metavar="N", help="baud rate of serial connections (57600)")
     parser.add_argument("--signing-key", metavar="FILE", help="sign sent frames, accept only signed frames")
+    px4_events(parser)
     parser.add_argument("--record", metavar="FILE", help="record all frames received and sent")
-    publisher(parser, HttpOptions)
-    publisher(parser, MqttOptions)
+    publishers(parser)
+    arms(parser)
     parser.add_argument("--forward", action="store_true", help="forward every frame between the links and the outs")
     parser.add_argument("--passive", action="store_true", help="never send on the vehicle links")
+    parser.add_argument("--no-kernel-filter", action="store_true", help="read every datagram, and count lost frames")
     parser.add_argument("--raw", action="store_true", help="the log is a raw capture of MAVLink, without time stamps")
     parser.add_argument(
         "--max-gap", type=gap, metavar="S", help="a longer silence in a log, once lost, is one line (60)"
@@ -50,7 +64,8 @@ def run(options: argparse.Namespace) -> int:
         _check_live(options)
         return _live(config, options)
     _check_replay(config, options, log)
-    from ..gateway.replay import replay
+    with importing():
+        from ..gateway.replay import replay
 
     replay(config, log, sys.stdout, raw=options.raw)
     return 0
@@ -63,10 +78,11 @@ def _log(config: Config) -> str | None:
 
 
 def _live(config: Config, options: argparse.Namespace) -> int:
-    from ..gateway.event_loop import EventLoop
-    from ..gateway.systemd import SystemdNotifier
+    with importing():
+        from ..gateway.event_loop import EventLoop
+        from ..gateway.systemd import SystemdNotifier
 
-    gateway = EventLoop(config, sys.stdout, notifier=SystemdNotifier())
+        gateway = EventLoop(config, sys.stdout, notifier=SystemdNotifier())
     gateway.stop_on_signals()
     if options.config:
         gateway.reload_on_hangup(lambda: _again(options))
@@ -89,10 +105,11 @@ def _check_live(options: argparse.Namespace) -> None:
 
 
 def _check_replay(config: Config, options: argparse.Namespace, log: str) -> None:
-    if options.http is not None:
+    if value_of(options, "--http") is not None:
         raise UsageError(f"{log}: a recorded log has no live page; write `{PROGRAM} report {log}`")
-    if options.mqtt is not None:
-        raise UsageError(f"{log}: a recorded log is not a live status: replay it without --mqtt")
+    for option in ("--mqtt", "--simple-message", "--ros2", "--arm"):
+        if value_of(options, option) is not None:
+            raise UsageError(f"{log}: a recorded log is not a live status: replay it without {option}")
     if len(config.links) > 1 or config.outs:
         raise UsageError(f"{log}: a recorded log is replayed alone, without other connections or --out")
     if config.record is not None or config.forward:

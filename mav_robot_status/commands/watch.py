@@ -30,5 +30,4 @@ def run(options: argparse.Namespace) -> int:
         if url.kind.is_log:
             raise UsageError(f"{url.text} is a recorded log; see it as a picture: {PROGRAM} report {url.text}")
     with BackgroundGateway(config) as source:
-        show(source)
-    return 0
+        return show(source)

@@ -10,6 +10,7 @@ import os
 from .model import (
     Config,
     ControllerConfig,
+    GroupConfig,
     HardwareConfig,
     IdentityConfig,
     LinkConfig,
@@ -21,6 +22,7 @@ from .model import (
 __all__ = [
     "Config",
     "ControllerConfig",
+    "GroupConfig",
     "HardwareConfig",
     "IdentityConfig",
     "LinkConfig",

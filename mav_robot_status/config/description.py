@@ -8,7 +8,7 @@ from dataclasses import fields
 from ..hardware.mavlink.options import HardwareOptions
 from ..interface import DEFAULT_HANDLE_NAME
 from ..links import url
-from .model import Config, ControllerConfig, HardwareConfig, LinkConfig, SigningConfig, VehicleConfig
+from .model import Config, ControllerConfig, GroupConfig, HardwareConfig, LinkConfig, SigningConfig, VehicleConfig
 from .reader import OUR_TYPES
 
 
@@ -20,7 +20,9 @@ def describe(config: Config) -> list[str]:
         *(f"out: {_link(out)}" for out in config.outs),
         *(f"vehicle: {_vehicle(vehicle)}" for vehicle in config.vehicles),
         *([_EVERY_VEHICLE] if config.hears_mavlink and not config.vehicles else []),
+        *(f"name: {_who(*ids)} is called '{name}'" for ids, name in config.names.items()),
         *(f"hardware: {_interface(interface)}" for interface in config.interfaces),
+        *(f"group: {_group(name, group)}" for name, group in config.groups.items()),
         f"identity: {_identity(config)}",
         *_options(config.hardware),
         f"requests: {_REQUESTS[config.requests]}",
@@ -44,20 +46,38 @@ _UNSIGNED = {
 
 
 def _link(link: LinkConfig) -> str:
-    return url.parse(link.url).words() + (" (passive: nothing is sent there)" if link.passive else "")
+    timeout = link.heartbeat_timeout
+    notes = (["passive: nothing is sent there"] if link.passive else []) + (
+        [] if timeout is None else [f"a vehicle there is lost after {timeout:g} s without a heartbeat"]
+    )
+    return url.parse(link.url).words() + (f" ({'; '.join(notes)})" if notes else "")
 
 
 def _vehicle(vehicle: VehicleConfig) -> str:
     who = (
         f"system {vehicle.system}" if vehicle.system is not None else "the first system heard that no other entry names"
     )
-    which = f"component {vehicle.component}" if vehicle.component is not None else "any autopilot component"
-    return f"{who}, {which} -> handle '{vehicle.handle}'"
+    called = "" if vehicle.name is None else f", called '{vehicle.name}'"
+    return f"{who}, {_which(vehicle.component)} -> handle '{vehicle.handle}'{called}"
+
+
+def _who(system: int, component: int | None) -> str:
+    return f"system {system}, {_which(component)}"
+
+
+def _which(component: int | None) -> str:
+    return "any autopilot component" if component is None else f"component {component}"
 
 
 def _interface(interface: HardwareConfig) -> str:
     options = ", ".join(f"{key}: {_value(value)}" for key, value in interface.options.items()) or "no options"
     return f"'{interface.name}' of type {interface.type} ({options})"
+
+
+def _group(name: str, group: GroupConfig) -> str:
+    members = ", ".join(f"'{handle}'" for handle in group.handles) or "every handle"
+    rules = [f"{field}: {rule.of or rule.logic.value}" for field, rule in group.fields.items()]
+    return f"'{name}' of {members}" + (f" ({', '.join(rules)})" if rules else "")
 
 
 def _identity(config: Config) -> str:
@@ -93,6 +113,8 @@ def _value(value: object) -> str:
         )
     if isinstance(value, frozenset):
         return ", ".join(sorted(value)) or "none"
+    if value is None:
+        return "none"
     if isinstance(value, bool):
         return str(value).lower()
     return getattr(value, "name", None) or str(value)

@@ -7,11 +7,12 @@ short file to gigabytes.
 from __future__ import annotations
 
 import os
-from typing import Final, NamedTuple, NoReturn
+from typing import Final, NoReturn
 
 import yaml
 
 from ..errors import ConfigError
+from ..values import NamedTuple
 
 MAX_BYTES: Final = 1_000_000
 MAX_DEPTH: Final = 20
@@ -188,7 +189,7 @@ class _Builder:
             value: bool | int | float | None = self._loader.construct_object(node)
         except (ValueError, LookupError, OverflowError):
             kind = node.tag.removeprefix(_TAG)
-            raise ConfigError(f"{at}: {quoted(text)} is no {kind}: quote it if it is a text") from None
+            raise ConfigError(f"{at}: {quoted(text)} does not read as {kind}: quote it if it is a text") from None
         return value
 
 

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, Literal, NamedTuple
+from dataclasses import field
+from typing import Annotated, Final, Literal
 
-from ..hardware.mavlink.options import HardwareOptions, Within
+from ..hardware.group import RULES, Rule
+from ..hardware.mavlink.options import HardwareOptions, OneOf, Or, Within
 from ..interface import DEFAULT_HANDLE_NAME
-
-
-class Or(NamedTuple):
-    """The word for None in a file."""
-
-    word: str
-
+from ..values import dataclass
 
 Id = Within(1, 255)
+VehicleName = Annotated[str, "name of a vehicle"]
+"""What people call a vehicle, see `is_vehicle_name`."""
+LONGEST_NAME: Final = 40
+"""Characters of the name of a vehicle."""
+GroupField = Annotated[str, OneOf(tuple(RULES))]
+
+
+def is_vehicle_name(text: str) -> bool:
+    """Whether a text can be the name of a vehicle: printable, not blank, not too long."""
+    return 0 < len(text) <= LONGEST_NAME and text.isprintable() and not text.isspace()
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +38,10 @@ class LinkConfig:
     """The most bytes a second that we send there without being asked. 0: no limit. None: 1000 on a link to vehicles,
     no limit on an out, which is an order to send."""
 
+    heartbeat_timeout: Annotated[float | None, Within(0.1, 86400.0, "s"), Or("auto")] = None
+    """Seconds without a heartbeat after which a vehicle there counts as lost. None: `hardware.heartbeat_timeout`; for a
+    vehicle that sends only HIGH_LATENCY2, three of its longest interval, at least 60 s."""
+
 
 @dataclass(frozen=True, slots=True)
 class VehicleConfig:
@@ -43,6 +52,18 @@ class VehicleConfig:
     component: Annotated[int | None, Id, Or("any")] = None
     """None: any autopilot of that system."""
     handle: str = DEFAULT_HANDLE_NAME
+    name: Annotated[VehicleName | None, Or("none")] = None
+    """What people call it."""
+
+
+@dataclass(frozen=True, slots=True)
+class NameConfig:
+    """The name of a vehicle that need not be expected: an entry of `vehicles` with a `name` and without a `handle`."""
+
+    system: Annotated[int, Id]
+    name: VehicleName
+    component: Annotated[int | None, Id, Or("any")] = None
+    """None: each autopilot of that system."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +127,16 @@ class ControllerConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class GroupConfig:
+    """Several handles as one. The name of the group is the name of its handle."""
+
+    handles: tuple[str, ...] = ()
+    """Its members. Empty: every handle that is not a group."""
+    fields: Mapping[GroupField, Rule] = field(default_factory=dict)
+    """The rules that differ from `hardware.group.RULES`."""
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """A whole configuration. As created it has the defaults."""
 
@@ -114,17 +145,25 @@ class Config:
     """Receivers of MAVLink other than the vehicle links."""
     vehicles: tuple[VehicleConfig, ...] = ()
     """Empty: every autopilot heard becomes a handle."""
+    names: Mapping[tuple[int, int | None], str] = field(default_factory=dict)
+    """More names of vehicles by system and component id: those of entries without a `handle`, and of `--name`. None as
+    component: each autopilot of the system."""
     identity: IdentityConfig = IdentityConfig()
     hardware: HardwareOptions = field(default_factory=HardwareOptions)
     """The options of the MAVLink hardware interface."""
     interfaces: tuple[HardwareConfig, ...] = ()
     """The other hardware interfaces."""
+    groups: Mapping[str, GroupConfig] = field(default_factory=dict)
+    """The groups, by the names of their handles."""
     requests: Literal["missing", "none"] = "missing"
     """Whether a needed message that does not arrive is requested."""
     signing: Annotated[SigningConfig | None, Or("none")] = None
     """None: nothing is signed or verified."""
     coalesce: Annotated[float, Within(0.0, 1.0, "s")] = 0.0
-    """Seconds to wait for more input before reading: fewer wake-ups, more delay."""
+    """Seconds to wait for more input before reading: fewer wake-ups if several frames come within it, more delay."""
+    kernel_filter: Annotated[bool | None, Or("auto")] = None
+    """Whether the kernel drops datagrams that no status needs, on UDP links whose frames nobody else needs. None: yes,
+    unless a publisher can show how many frames were lost."""
     max_gap: Annotated[float, Within(0.0, 86400.0, "s")] = 60.0
     """A longer silence of a recorded log, after the link is lost, gives one line."""
     forward: bool = False

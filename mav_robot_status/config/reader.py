@@ -13,7 +13,7 @@ from ..links import url
 from ..links.tlog_file import check_name
 from ..mavlink.component import GROUND_STATION
 from .document import Node, load_document, quoted
-from .model import Config, ControllerConfig, HardwareConfig, PublisherConfig, VehicleConfig
+from .model import Config, ControllerConfig, HardwareConfig, NameConfig, PublisherConfig, VehicleConfig
 from .values import did_you_mean, entries, read
 
 OUR_TYPES: Final = (
@@ -43,17 +43,19 @@ def load(path: str | os.PathLike[str]) -> Config:
 def build(document: Node) -> Config:
     """The configuration that a file holds. Raises ConfigError."""
     sections = get_type_hints(Config, include_extras=True)
-    del sections["controllers"], sections["interfaces"]
+    del sections["controllers"], sections["interfaces"], sections["names"]
     given, interfaces = _hardware(entries(document))
+    given, names = _names(given)
     read_sections = {key: read(sections[key], node) for key, node in given.items() if key in sections}
     stanzas = [_controller(key, node, sections) for key, node in given.items() if key not in sections]
-    config = Config(**read_sections, interfaces=interfaces, controllers=tuple(stanzas))
+    config = Config(**read_sections, names=names, interfaces=interfaces, controllers=tuple(stanzas))
     _check_hysteresis(config, given)
     _check_outs(config, given)
     _check_record(config.record, given)
     _check_vehicles(config.vehicles, given)
     _check_identity(config, given)
     _check_handles(config, given)
+    _check_groups(config, given)
     return config
 
 
@@ -76,6 +78,30 @@ def _hardware(given: dict[str, Node]) -> tuple[dict[str, Node], tuple[HardwareCo
             plain = {key: option.plain() for key, option in options.items()}
             others[name] = HardwareConfig(kind, name, plain, node.at)
     return given, tuple(others.values())
+
+
+def _names(given: dict[str, Node]) -> tuple[dict[str, Node], dict[tuple[int, int | None], str]]:
+    """Split the list `vehicles`: the expected vehicles, and the entries that give a name and no handle."""
+    section = given.get("vehicles")
+    if section is None or not isinstance(section.value, list):
+        return given, {}
+    expected = [node for node in section.value if not _is_only_named(node)]
+    names: dict[tuple[int, int | None], str] = {}
+    for node in filter(_is_only_named, section.value):
+        if expected:
+            raise node.fault(
+                f"{node.name} has a name and no 'handle', and would be ignored: {expected[0].name} makes the list the "
+                "only vehicles; write its 'handle'"
+            )
+        entry: NameConfig = read(NameConfig, node)
+        if (entry.system, entry.component) in names:
+            raise node.fault(f"system {entry.system} is there twice: one vehicle has one name")
+        names[entry.system, entry.component] = entry.name
+    return {**given, "vehicles": section._replace(value=expected)}, names
+
+
+def _is_only_named(node: Node) -> bool:
+    return isinstance(node.value, dict) and "name" in node.value and "handle" not in node.value
 
 
 def _typed(node: Node) -> tuple[str, str, dict[str, Node]]:
@@ -126,6 +152,10 @@ def _check_outs(config: Config, given: dict[str, Node]) -> None:
             )
         if out.passive:
             raise entries(node)["passive"].key_fault("an out cannot be passive: remove 'passive'")
+        if out.heartbeat_timeout is not None:
+            raise entries(node)["heartbeat_timeout"].key_fault(
+                "no vehicle is heard on an out: write 'heartbeat_timeout' under a link"
+            )
 
 
 def _check_record(path: str | None, given: dict[str, Node]) -> None:
@@ -153,12 +183,33 @@ def _check_handles(config: Config, given: dict[str, Node]) -> None:
     if config.interfaces:  # they register their handles when they open
         return
     handles = {vehicle.handle: None for vehicle in config.vehicles}
+    if handles:
+        handles |= dict.fromkeys(config.groups)
     for controller in config.controllers:
         wanted = controller.parameters.get("handle_name", DEFAULT_HANDLE_NAME)
         if handles and controller.type in OUR_TYPES and wanted not in handles:
             stanza = given[controller.name]
             at = entries(stanza).get("handle_name", stanza.key or stanza)
             raise at.fault(f"there is no handle {quoted(str(wanted))}; the vehicles have: {', '.join(handles)}")
+
+
+def _check_groups(config: Config, given: dict[str, Node]) -> None:
+    others = {interface.name for interface in config.interfaces} | {vehicle.handle for vehicle in config.vehicles}
+    for name, group in config.groups.items():
+        node = entries(given["groups"])[name]
+        if name in others:
+            raise node.key_fault(f"a group cannot have the handle {quoted(name)}: a robot has it; choose another name")
+        written = entries(node)
+        for handle, item in zip(group.handles, _items(written, "handles"), strict=True):
+            if handle in config.groups:
+                raise item.fault(f"{quoted(handle)} is a group: a group has robots as members; name those")
+            if group.handles.count(handle) > 1:
+                raise item.fault(f"{quoted(handle)} is there twice: one member counts once")
+        for field, rule in group.fields.items():
+            if rule.of is not None and group.handles and rule.of not in group.handles:
+                raise entries(written["fields"])[field].fault(
+                    f"{quoted(rule.of)} is not a member: {did_you_mean(rule.of, group.handles)}"
+                )
 
 
 def _items(given: dict[str, Node], section: str) -> list[Node]:

@@ -15,10 +15,13 @@ from enum import EnumMeta
 from typing import Annotated, Any, Final, Literal, get_args, get_origin, get_type_hints
 
 from ..errors import ConfigError, UsageError
-from ..hardware.mavlink.options import OneOf, Within
+from ..hardware.group import Logic, Rule
+from ..hardware.mavlink.autopilots.mode_names import numbers
+from ..hardware.mavlink.options import CustomMode, ModeOverrides, OneOf, Or, Within
+from ..interface import RobotMode
 from ..links import url
 from .document import Node, quoted, short
-from .model import LinkConfig, Or, PublisherConfig
+from .model import LONGEST_NAME, LinkConfig, PublisherConfig, VehicleName, is_vehicle_name
 
 MAX_TEXT: Final = 1000
 """Characters of a name or a connection string."""
@@ -92,6 +95,12 @@ def _text(node: Node) -> str:
     return node.value
 
 
+def _vehicle_name(node: Node) -> str:
+    if isinstance(node.value, str) and not is_vehicle_name(node.value):
+        raise node.fault(f"{node.name} must be a text of 1 to {LONGEST_NAME} printable characters")
+    return _text(node)
+
+
 def _number(kind: type[int | float], node: Node, within: Within | None = None, word: Or | None = None) -> int | float:
     value: Any = _seconds(node.value) if within and within.unit == "s" else node.value
     if type(value) in (int, kind) and math.isfinite(value) and (not within or within.low <= value <= within.high):
@@ -119,7 +128,7 @@ def _annotated(hint: Any, node: Node) -> Any:
         return _one_of(node.text, names.names, node)
     if dataclasses.is_dataclass(base):
         return read_fields(base, node)
-    if base in (bool, str):
+    if base in (bool, str, VehicleName):
         return _KINDS[base](node)
     return _number(base, node, by_type.get(Within), word)
 
@@ -163,11 +172,47 @@ def _publisher(node: Node) -> PublisherConfig:
     return PublisherConfig(name, {key: option.plain() for key, option in given.items()}, node.at)
 
 
+def _rule(node: Node) -> Rule:
+    """A rule of a group: `any`, `all`, or `{of: HANDLE}`."""
+    if isinstance(node.value, dict):
+        given = entries(node, ("of",))
+        if "of" not in given:
+            raise node.fault(f"{node.name} has no 'of': write {{of: HANDLE}}, any or all")
+        return Rule(Logic.ANY, _text(given["of"]))
+    return Rule(Logic(_one_of(node.text, [logic.value for logic in Logic], node)))
+
+
+def _mode_overrides(node: Node) -> dict[int, RobotMode]:
+    """The modes to publish, by custom_mode. The key of the node is the vehicle family, whose names are known."""
+    family = node.key.text if node.key else ""
+    known = numbers(family)
+    found: dict[int, RobotMode] = {}
+    for name, value in entries(node).items():
+        key = value.key or value
+        number = known.get(name.upper())
+        if number is None and not isinstance(key.value, int):
+            raise key.fault(_no_mode(family, key, known))
+        number = read(CustomMode, key) if number is None else number
+        if number in found:
+            raise key.fault(f"mode {number} of {family} is there twice, as {quoted(name)} and with another name")
+        found[number] = read(RobotMode, value)
+    return found
+
+
+def _no_mode(family: str, key: Node, known: Mapping[str, int]) -> str:
+    if not known:
+        return f"the modes of {quoted(family)} have no names here: write the number, custom_mode, not {key.shown()}"
+    return f"{family} has no mode {key.shown()} (a name or a custom_mode): {did_you_mean(key.text.upper(), known)}"
+
+
 _KINDS: Final[dict[Any, Callable[[Node], Any]]] = {
     bool: _bool,
     str: _text,
+    VehicleName: _vehicle_name,
+    ModeOverrides: _mode_overrides,
     float: lambda node: _number(float, node),
     LinkConfig: _link,
+    Rule: _rule,
     PublisherConfig: _publisher,
 }
 _GENERIC: Final[dict[Any, Callable[[Any, Node], Any]]] = {

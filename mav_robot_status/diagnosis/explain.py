@@ -18,8 +18,9 @@ from ..gateway.recorded_log import Recording
 from ..gateway.replay import ReplayPipeline, run_through
 from ..interface import LinkState
 from ..interface.explanation import explanation
+from ..language import remedy
 from ..streams import NO_OUTPUT
-from . import applet
+from . import applet, arming_checks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -121,13 +122,14 @@ def moment(at: str, start_us: int) -> int:
 
 
 def explanations(hw: HardwareInterface, vehicles: MavlinkRobotHW, now: Instant) -> list[dict[str, Any]]:
-    """One explanation for each robot heard. That of an ArduPilot has a member `applet`."""
+    """One explanation for each robot heard. That of an ArduPilot has a member `applet`, of a PX4 `arming_checks`."""
     heard = list(filter(_is_heard, hw.handles))
     for handle in heard:
         hw.explain(handle.name, now)
     reports = applet.reports(vehicles, now)
-    with_applet = {name: {"applet": report} for name, report in reports.items()}
-    return [explanation(handle, now) | with_applet.get(handle.name, {}) for handle in heard]
+    more: dict[str, dict[str, Any]] = {name: {"applet": report} for name, report in reports.items()}
+    more |= {name: {"arming_checks": checks} for name, checks in arming_checks.reports(vehicles).items()}
+    return [explanation(handle, now) | more.get(handle.name, {}) for handle in heard]
 
 
 def _is_heard(handle: IndustrialRobotStatusHandle) -> bool:
@@ -145,10 +147,7 @@ def as_table(found: Iterable[dict[str, Any]]) -> list[str]:
 
 
 def _table(one: dict[str, Any]) -> Iterator[str]:
-    vehicle, link = one["vehicle"], one["link"]
-    names = (vehicle["autopilot"], vehicle.get("firmware"), vehicle["type"], vehicle["flight_mode"])
-    kind = ", ".join(str(name) for name in names if name is not None)
-    yield f"vehicle {one['system']}.{one['component']} ({kind}), {link['state']}, at {one['stamp']}"
+    yield f"{_name(one)}, {one['link']['state']}, at {one['stamp']}"
     rows = [("field", "value", "age", "why")]
     for name, field in one["fields"].items():
         value = {True: "TRUE", False: "FALSE", None: "UNKNOWN"}.get(field["value"], field["value"])
@@ -160,10 +159,45 @@ def _table(one: dict[str, Any]) -> Iterator[str]:
         yield "  ".join((row[0].ljust(widths[0]), row[1].ljust(widths[1]), row[2].rjust(widths[2]), row[3]))
     if "applet" in one:
         yield f"applet   {_report(one['applet'])}"
-    for error in one["errors"]:
-        yield f"error    {error['code']} {error['name']} since {error['since']}{_said(error['text'])}"
-    for inhibit in one["inhibits"]:
-        yield f"inhibit  {inhibit['name']} since {inhibit['since']}{_said(inhibit['text'])}"
+    yield from _causes(one)
+    for check in one.get("arming_checks", ()):
+        yield f"check    {_checked(check)}"
+
+
+def _causes(one: dict[str, Any]) -> Iterator[str]:
+    """The errors and inhibits, each with its next step. A step is named once."""
+    named: set[str] = set()
+    for kind, cause in (*(("error", e) for e in one["errors"]), *(("inhibit", i) for i in one["inhibits"])):
+        code = f"{cause['code']} " if kind == "error" else ""
+        yield f"{kind:<9}{_member(cause)}{code}{cause['name']} since {cause['since']}{_said(cause['text'])}"
+        step = remedy(cause).step
+        if step and step not in named:
+            yield f"{'step':<9}{step}"
+        named.add(step)
+
+
+def _checked(check: dict[str, Any]) -> str:
+    """A failing arming check: its text, its component, its modes, and what can be done about it."""
+    modes = "" if check["modes"] is None else f", modes: {', '.join(check['modes'])}"
+    more = "" if check["description"] is None else f". {check['description']}"
+    return f"{check['text']} since {check['since']}, component: {check['component']}{modes}{more}"
+
+
+def _name(one: dict[str, Any]) -> str:
+    """`vehicle 1.1 (ARDUPILOTMEGA, GROUND_ROVER, AUTO)`; a robot without MAVLink and a group have their handle."""
+    if "members" in one:
+        return f"group {one['handle']} ({', '.join(one['members'])})"
+    vehicle = one["vehicle"]
+    names = (vehicle["autopilot"], vehicle.get("firmware"), vehicle["type"], vehicle["flight_mode"])
+    kind = ", ".join(str(name) for name in names if name is not None)
+    who = f"robot {one['handle']}" if one["system"] is None else f"vehicle {one['system']}.{one['component']}"
+    who += f" '{vehicle['name']}'" if "name" in vehicle else ""
+    return f"{who} ({kind})"
+
+
+def _member(cause: dict[str, Any]) -> str:
+    """The member of a group that reports it."""
+    return f"{cause['handle']}: " if "handle" in cause else ""
 
 
 def _report(report: dict[str, Any] | None) -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 import logging
 import threading
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
 from ..config import PublisherConfig
 from ..mavlink import definitions as mav
 from ..publishers.board import BoardPublisher
 from ..streams import NO_OUTPUT
+from ..values import NamedTuple
 from .controller_config import DEFAULT_CONTROLLER
 from .event_loop import EventLoop
 from .observer import Observer
@@ -53,9 +54,11 @@ class Row(NamedTuple):
 
 
 class BackgroundGateway(Observer):
-    """A gateway in its own thread; `with` starts and stops it. It publishes to the board only."""
+    """A gateway in its own thread; `with` starts and stops it. It publishes to the board, and to those `beside` it."""
 
-    def __init__(self, config: Config, clock: Callable[[], Instant] = present) -> None:
+    def __init__(
+        self, config: Config, clock: Callable[[], Instant] = present, *, beside: Iterable[PublisherConfig] = ()
+    ) -> None:
         """Open everything. Raises LinkError, ConfigError."""
         self.now = clock
         self.explained = ""
@@ -65,7 +68,7 @@ class BackgroundGateway(Observer):
         self._rates: dict[tuple[int, int], Rates] = {}
         self._error: BaseException | None = None
         self._ended = threading.Event()
-        self.gateway = EventLoop(on_a_board(config), NO_OUTPUT, clock, observers=[self])
+        self.gateway = EventLoop(on_a_board(config, beside), NO_OUTPUT, clock, observers=[self])
         publishers = self.gateway.pipeline.publishers.values()
         publisher = next(p for p in publishers if isinstance(p, BoardPublisher))
         self._board, self._lock = publisher.board, publisher.lock
@@ -114,7 +117,9 @@ class BackgroundGateway(Observer):
         now = self.now().mono
         # the line contains the age at the time of writing
         age = None if entry.heartbeat_age is None else entry.heartbeat_age + max(0.0, now - entry.at)
-        rates = self._rates.get((entry.line["system"], entry.line["component"]))
+        rates = None  # a group receives nothing itself
+        if not entry.line.get("members"):
+            rates = self._rates.get((entry.line["system"], entry.line["component"]))
         return Row(entry.line, entry.stamp, entry.version, age, {} if rates is None else rates.at(now))
 
     def _run(self) -> None:
@@ -177,9 +182,9 @@ class Rates:
         }
 
 
-def on_a_board(config: Config) -> Config:
-    """The configuration with a board as its only output."""
+def on_a_board(config: Config, beside: Iterable[PublisherConfig] = ()) -> Config:
+    """The configuration with a board, and with the publishers beside it, as its only outputs."""
     controller = dataclasses.replace(
-        DEFAULT_CONTROLLER, parameters={"publish_rate": RATE}, publishers=(PublisherConfig("board"),)
+        DEFAULT_CONTROLLER, parameters={"publish_rate": RATE}, publishers=(PublisherConfig("board"), *beside)
     )
     return dataclasses.replace(config, controllers=(controller,), outs=(), forward=False, record=None)

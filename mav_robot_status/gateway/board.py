@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
 from ..publishers.board import Board
+from ..publishers.error_reporter import ErrorReporter
 from ..publishers.mqtt.connection import Connection
-from ..publishers.mqtt.error_reporter import ErrorReporter
 from ..publishers.mqtt.fleet import Fleet
 from ..publishers.mqtt.loop import Loop
 from ..publishers.web.serve import serve
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from ..publishers.mqtt.settings import Broker
     from ..publishers.web.events import Events
     from ..publishers.web.settings import WebSettings
+
+    Line = tuple[Mapping[str, Any], Mapping[str, Any] | None]
+    """A line, and the last one with a connected link."""
 
 log = logging.getLogger(__name__)
 
@@ -45,9 +48,9 @@ class FleetBoard:
         self._server = serve(Board(), options._replace(stale_after=float(broker.keepalive)))
         self._loop = Loop(present)
         ident = f"mrs-board-{secrets.token_hex(6)}"
-        self._connection = Connection(broker, ident, None, self, ErrorReporter(broker))
+        self._connection = Connection(broker, ident, None, self, ErrorReporter("mqtt", broker.name))
         self._loop.add(self._connection)
-        self._waiting: dict[str, Mapping[str, Any]] = {}
+        self._waiting: dict[str, Line] = {}
         self._stop = False
         self._missing_logged_at, self._missing_logged = -MISSING_PERIOD, 0
         self._subscribed = False
@@ -114,7 +117,7 @@ class FleetBoard:
         self._fleet.take(message.topic, bytes(message.payload), message.retain, present())
 
     def _hand_over(self) -> None:
-        self._waiting.update(self._fleet.news())
+        self._waiting.update((name, (line, self._fleet.last(name))) for name, line in self._fleet.news().items())
         if self._waiting and self._server.post(partial(_put, self._waiting)):
             self._waiting = {}
 
@@ -129,7 +132,7 @@ class FleetBoard:
             log.warning("%d of %d events are missing", self._missing_logged, events)
 
 
-def _put(lines: Mapping[str, Mapping[str, Any]], board: Board, events: Events, now: Instant) -> None:
+def _put(lines: Mapping[str, Line], board: Board, events: Events, now: Instant) -> None:
     """In the server's thread."""
-    for name, line in lines.items():
-        board.update_line(name, line, now.mono)
+    for name, (line, last) in lines.items():
+        board.update_line(name, line, now.mono, last)

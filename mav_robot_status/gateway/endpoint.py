@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import logging
 import math
+import shlex
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Final
 
-from ..hardware.mavlink.message_table import WANTED_IDS
+from ..hardware.mavlink.message_table import IDS_WITH_FILES, WANTED_IDS
 from ..links.base import ServesClients
 from ..links.guarded import open_guarded
 from ..links.udp import UdpSender
 from ..links.url import parse
 from ..mavlink.counters import Counters
 from ..mavlink.framing import Parser
+from .kernel_filter import KernelFilter
 from .speech import LIMIT, Speech
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ MOST_SOURCES: Final = 64
 """Limit of channels of one link. The one silent longest is dropped, but none on which a vehicle speaks."""
 MOST_PEERS: Final = 8
 PEER_SILENCE: Final = 30.0
-"""Seconds of silence after which a peer is no peer any more."""
+"""Seconds of silence after which a peer is forgotten."""
 NEWCOMER_SILENCE: Final = 5.0
 """Seconds for which a silent newcomer keeps its place. Who has spoken for longer keeps it for as long."""
 ACTIVE: Final = 10.0
@@ -50,9 +52,11 @@ class Channel:
         "interval",
         "is_peer",
         "parser",
+        "quiet",
         "since",
         "source",
         "systems",
+        "wanted",
     )
 
     def __init__(self, endpoint: Endpoint, source: Address, parser: Parser) -> None:
@@ -73,8 +77,12 @@ class Channel:
         self.frames = -1
         """The frames of the parser when `Endpoint.forget_silent` was called last."""
         self.active_at = NEVER
+        self.quiet = False
+        """Whether only vehicles are heard there that send HIGH_LATENCY2 alone: what we send there costs them dearly."""
         self.systems: set[int] = set()
         """The system ids of the vehicles that are heard there: messages about others are not sent there."""
+        self.wanted = WANTED_IDS
+        """The ids of the messages that are used."""
 
     @property
     def is_out(self) -> bool:
@@ -85,6 +93,12 @@ class Channel:
     def passive(self) -> bool:
         """Whether sending there is forbidden."""
         return self.endpoint.passive
+
+    def hear_files(self, on: bool) -> None:
+        """Use messages that bring files, or no longer. May be repeated: its parser may be another one meanwhile."""
+        self.wanted = IDS_WITH_FILES if on else WANTED_IDS
+        self.parser.want(self.wanted)
+        self.endpoint.filter.widen(self.wanted)
 
     def gives_way(self, now: float) -> bool:
         """Whether it leaves its place to another, because no vehicle speaks on it."""
@@ -104,20 +118,33 @@ class Channel:
 class Endpoint:
     """One link with its channels. Bounded for any number of senders."""
 
-    def __init__(self, config: LinkConfig, is_out: bool = False, number: int = 0, *, keep_all: bool = False) -> None:
-        """Open the link. Raises LinkError, UsageError. `keep_all`: parse every frame, to forward or record it."""
+    def __init__(
+        self,
+        config: LinkConfig,
+        is_out: bool = False,
+        number: int = 0,
+        *,
+        keep_all: bool = False,
+        filters: bool = False,
+    ) -> None:
+        """Open the link. Raises LinkError, UsageError.
+
+        `keep_all`: parse every frame, to forward or record it. `filters`: the kernel may drop what no status needs.
+        """
         url = parse(config.url)
         self.url = config.url
         """As in the configuration."""
         self.link: Link = open_guarded(url)
         if isinstance(self.link, ServesClients):
             self.link.is_active = self.is_active
-        self._serial = url.kind.is_serial
+        self.is_serial = url.kind.is_serial
         self.number: int
         """The number of the link in its gateway, from 0."""
         self.robot_status: bool
         """Whether ROBOT_STATUS is sent on this link, if it is a vehicle link."""
         self.passive: bool
+        self.heartbeat_timeout: float | None
+        """Seconds without a heartbeat after which a vehicle there counts as lost. None: the link does not say."""
         self.speech = Speech()
         self._wanted: frozenset[int] | None = WANTED_IDS
         self._channels: OrderedDict[Address, Channel] = OrderedDict()
@@ -126,7 +153,8 @@ class Endpoint:
         self._stranger: Address = None
         """The address whose bytes it has."""
         self.is_out = is_out
-        self.adjust(config, number, keep_all=keep_all)
+        self.filter = KernelFilter(self.link)
+        self.adjust(config, number, keep_all=keep_all, filters=filters)
         self.must_speak = url.kind.speaks_first
         self.listens = url.kind.listens
         """Whether each source address is a peer. Otherwise the link has one peer, whatever the address."""
@@ -140,10 +168,12 @@ class Endpoint:
         if not self.listens:
             self._only = self._channels[None] = Channel(self, None, Parser(self._wanted))
 
-    def adjust(self, config: LinkConfig, number: int, *, keep_all: bool = False) -> None:
+    def adjust(self, config: LinkConfig, number: int, *, keep_all: bool = False, filters: bool = False) -> None:
         """Change an open link: everything except its URL."""
+        self.filter.allow(filters and not keep_all)
         self.number, self.passive = number, config.passive
-        self.robot_status = not self._serial if config.robot_status is None else config.robot_status
+        self.heartbeat_timeout = config.heartbeat_timeout
+        self.robot_status = not self.is_serial if config.robot_status is None else config.robot_status
         default = None if self.is_out else LIMIT
         self.speech_limit = (config.speech_limit or None) if config.speech_limit is not None else default
         self.speech.renew(self.speech_limit)
@@ -187,7 +217,7 @@ class Endpoint:
         """A channel for an address that speaks MAVLink. It gets the parser of its first bytes."""
         self._stranger = None
         if self._asks is not None:
-            if not self._asks.may_answer(source, self._source, now - self._source_at):
+            if not self._asks.may_answer(source, self._source, self._silence(now)):
                 return None
             self._asks.answered(source)
             self._source, self._source_at = source, now
@@ -202,6 +232,10 @@ class Endpoint:
         channel = self._channels[source] = Channel(self, source, self._scratch)
         self._scratch = spare or Parser(self._wanted)
         return channel
+
+    def _silence(self, now: float) -> float:
+        """Seconds for which the one peer is silent."""
+        return math.inf if self._source is None else self.filter.silence(self._source_at, now)
 
     def heard(self, channel: Channel, now: float) -> bool:
         """Note a heartbeat. On a listening link the channel becomes a peer, up to MOST_PEERS. True if it is new.
@@ -247,6 +281,27 @@ class Endpoint:
                 if self.listens:
                     channel.is_peer, channel.interval = False, None
 
+    def review_filter(self, now: float, *, heard: bool) -> None:
+        """Begin or end the filter in the kernel. Called once a second; `heard`: a vehicle was heard here lately."""
+        channels = self._channels.values()
+        wanted = WANTED_IDS.union(*(channel.wanted for channel in channels))
+        heard = heard or (self.is_out and any(now - channel.heard_at <= ACTIVE for channel in channels))
+        if self.filter.review(now, wanted, heard=heard, cut=any(channel.parser.pending for channel in channels)):
+            for channel in channels:
+                channel.parser = _renewed(channel.parser, None if self._wanted is None else channel.wanted)
+                channel.parser.counters.lost = 0
+            self._scratch = Parser(self._wanted)
+
+    @property
+    def lost(self) -> int | None:
+        """Gaps in the sequence numbers; None: not counted, because the kernel filters."""
+        return self.totals().lost if self.filter.counts else None
+
+    @property
+    def dropped(self) -> int | None:
+        """What the link counts as dropped; None: not known, because the kernel filters."""
+        return self.link.dropped if self.filter.counts else None
+
     def totals(self) -> Counters:
         """The counters of all channels, added up."""
         total = Counters()
@@ -255,7 +310,7 @@ class Endpoint:
         return total
 
     def log_silence(self) -> None:
-        """Log that no autopilot was heard on this link, and what was received."""
+        """Log that no autopilot was heard on this link, what was received, and what finds the cause."""
         got = self.totals()
         received = (
             f"{got.frames} MAVLink frames"
@@ -264,21 +319,24 @@ class Endpoint:
             if got.garbage_bytes
             else "no MAVLink"
         )
-        log.warning("no autopilot heard yet, %s: %s so far", self.link.text, received)
+        log.warning(
+            "no autopilot heard yet, %s: %s so far; to find out why, stop this and run: mav-robot-status doctor %s",
+            self.link.text, received, shlex.quote(self.url),
+        )  # fmt: skip
 
     def log_counters(self) -> None:
         """Log the totals of this link."""
         got = self.totals()
         log.info(
-            "%s: %d frames, %d lost, %d with a bad CRC, %d with an unknown id, %d bytes of garbage, "
-            "%d datagrams dropped; sent %d bytes unasked, %d messages held back",
+            "%s: %d frames, %s, %d with a bad CRC, %d with an unknown id, %d bytes of garbage, "
+            "%s; sent %d bytes unasked, %d messages held back",
             self.link.text,
             got.frames,
-            got.lost,
+            "lost ones not counted" if self.lost is None else f"{self.lost} lost",
             sum(got.bad_crc.values()),
             sum(got.unknown.values()),
             got.garbage_bytes,
-            self.link.dropped,
+            "dropped datagrams not counted" if self.dropped is None else f"{self.dropped} datagrams dropped",
             self.speech.said,
             self.speech.withheld,
         )

@@ -17,6 +17,7 @@ from .arrival import LATE, STALL
 from .controller_config import check
 from .live_hardware import LiveHardware
 from .metrics import metrics
+from .pace import MOST_AT_ONCE, UNCOUNTED, Pace
 from .pipeline import Pipeline
 from .systemd import SystemdNotifier
 
@@ -33,14 +34,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 LONGEST_WAIT: Final = 1.0  # s
-PACE: Final = 0.002
-"""Seconds between wake-ups under continuous input. A wake-up costs as much as ten frames."""
-BURST: Final = 8 * PACE
-"""Eight wake-ups may follow each other without a pause, so single messages and short bursts are not delayed."""
-MOST_AT_ONCE: Final = 1024
-"""Datagrams of usual length read in one wake-up of each link; bounded, so that a flood does not stop the rest."""
 MOST_AFTER_PAUSE: Final = 8 * MOST_AT_ONCE
-"""The same after a pause. Enough for a full socket buffer: it should be read before the next status."""
+"""Datagrams read after a pause. Enough for a full socket buffer: it should be read before the next status."""
 
 
 class EventLoop:
@@ -57,7 +52,7 @@ class EventLoop:
         """Open everything. Raises LinkError, ConfigError. Without a `notifier` nothing is sent to systemd."""
         self._clock = clock
         self._notifier = SystemdNotifier({}) if notifier is None else notifier
-        self._rested = -math.inf
+        self._pace = Pace(config.coalesce)
         self._stop = self._hung_up = False
         self._reread: Callable[[], Config] | None = None
         self._handlers: dict[int, Any] = {}
@@ -69,6 +64,8 @@ class EventLoop:
             opened.callback(self.hardware.close)
             port = self.hardware.mavlink.hub
             self.pipeline = Pipeline(config, self.hardware.all, port, stdout, metrics=self.metrics, observers=observers)
+            opened.callback(lambda: self.pipeline.close(clock()))
+            self.hardware.open()
             self._wake_read, self._wake_write = socket.socketpair()
             opened.pop_all()
         self._wake_read.setblocking(False)
@@ -116,33 +113,38 @@ class EventLoop:
                 if self._hung_up:
                     self._reload(now)
                     poll, due, next_due = self._new_poll(), -math.inf, self.hardware.all.next_due
-                due = min(due, next_due())
-                if now.mono >= due:  # most input changes no status, and needs no turn
-                    self._watch(poll)
+                soon = next_due()
+                if now.mono >= due or now.mono >= soon:  # most input changes no status, and needs no turn
                     self.turn(now)
-                    due = min(self._next_due(now.mono), now.mono + LONGEST_WAIT)
+                    due = self._prepare(poll, now.mono)
                     now = self._clock()
-                wait = due - now.mono
-                if now.mono < self._rested < due:
-                    rest = self._rested - now.mono
-                    time.sleep(rest)
-                    wait -= rest
+                elif soon < due:
+                    due = soon
+                wait = rest = due - now.mono
+                if now.mono < self._pace.rests_until:
+                    rest -= self._rest(now.mono, due)
                 # poll takes milliseconds: rounded down, the loop would spin until the due time
-                events = poll.poll(math.ceil(wait * 1000) if wait > 0 else 0)
-                if self._config.coalesce and events:
-                    self._gather(due)
-                now = self._clock()
+                events = poll.poll(math.ceil(rest * 1000) if rest > 0 else 0)
+                before, now = now, self._clock()
                 if events:
-                    limit = self._limit(now.mono)
-                    if now.mono - looked.mono > LATE:
-                        limit = self._look_late(looked, now, wait)
-                    for descriptor, _ in events:
-                        source = self._polled.get(descriptor)
-                        if source is not None:
-                            source.receive(now, limit)
+                    self._receive(events, before.mono, looked, now, wait)
                 looked = now
         finally:
             self.close()
+
+    def _receive(
+        self, events: Sequence[tuple[int, int]], before: float, looked: Instant, now: Instant, wait: float
+    ) -> None:
+        """Read the sources that have input, which was waited for since `before`. `looked`: the last look at them."""
+        limit = self._pace.limit(before, now.mono)
+        if now.mono - looked.mono > LATE:
+            limit = self._look_late(looked, now, wait)
+        for descriptor, _ in events:
+            source = self._polled.get(descriptor)
+            if source is not None:
+                read = source.receive(now, limit)
+                if limit > 1 or read != 1:
+                    self._pace.count(UNCOUNTED if read is None else read, now.mono)
 
     def _look_late(self, looked: Instant, now: Instant, wait: float) -> int:
         """Tell the links that their input may be old, and how many datagrams to read.
@@ -181,15 +183,23 @@ class EventLoop:
         self._polled = {}
         return poll
 
-    def _watch(self, poll: select.poll) -> None:
-        """Register the sources that have a descriptor now."""
-        found = {descriptor: s for s in self.hardware.all.sources() if (descriptor := s.fileno()) >= 0}
+    def _prepare(self, poll: select.poll, now: float) -> float:
+        """After a turn: watch the sources that have a descriptor now. Returns when the next turn is due."""
+        due = min(self._notifier.next_due(), now + LONGEST_WAIT)
+        found = {}
+        for source in self.hardware.all.sources():
+            descriptor = source.fileno()
+            if descriptor >= 0:
+                found[descriptor] = source
+            due = min(due, source.next_due())
+        due = min(due, self.pipeline.next_due(now, due))
         if found.keys() != self._polled.keys():
             for descriptor in self._polled.keys() - found.keys():
                 poll.unregister(descriptor)
             for descriptor in found.keys() - self._polled.keys():
                 poll.register(descriptor, select.POLLIN)
         self._polled = found
+        return due
 
     def _hang_up(self) -> None:
         self._hung_up = True
@@ -218,26 +228,16 @@ class EventLoop:
     def _change(self, config: Config, now: Instant) -> None:
         self.hardware.change(config)
         self.pipeline.change(config, self.hardware.renew, now)
+        self._pace = Pace(config.coalesce)
         self._config = config
 
-    def _gather(self, due: float) -> None:
-        """Wait for more input, so that fewer wake-ups are needed. `stop` and a due time end the wait."""
-        seconds = min(self._config.coalesce, due - self._clock().mono)
-        if seconds > 0:
-            select.select([self._wake_read], [], [], seconds)
-
-    def _limit(self, now: float) -> int:
-        """How many datagrams to read after a wake-up. Also sets the earliest next wake-up.
-
-        One after a quiet time: most datagrams arrive alone, and a second read call would cost more than it finds.
-        """
-        rested = now - BURST
-        if self._rested < rested and not self._config.coalesce:
-            self._rested = rested + PACE
-            return 1
-        self._rested = min(max(self._rested, rested), now) + PACE
-        return MOST_AT_ONCE
-
-    def _next_due(self, now: float) -> float:
-        due = min(self.pipeline.next_due(now, now + LONGEST_WAIT), self._notifier.next_due())
-        return min([due, *(source.next_due() for source in self.hardware.all.sources())])
+    def _rest(self, now: float, due: float) -> float:
+        """Let input gather. A due time ends the rest, and `stop` ends a long one. Returns the seconds it took."""
+        rest = min(self._pace.rests_until, due) - now
+        if rest <= 0:
+            return 0.0
+        if self._pace.gather:
+            select.select([self._wake_read], [], [], rest)
+        else:
+            time.sleep(rest)
+        return rest

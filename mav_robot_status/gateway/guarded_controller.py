@@ -15,10 +15,12 @@ if TYPE_CHECKING:
 class GuardedController:
     """Calls a controller when its handle has changed, or when the controller is due. Holds the state of both."""
 
-    __slots__ = ("controller", "detail", "due", "guard", "handle", "running", "status", "updated")
+    __slots__ = ("controller", "detail", "due", "guard", "handle", "number", "running", "status", "updated")
 
-    def __init__(self, name: str, controller: Controller, handle: IndustrialRobotStatusHandle) -> None:
+    def __init__(self, name: str, controller: Controller, handle: IndustrialRobotStatusHandle, number: int = 0) -> None:
         self.controller = controller
+        self.number = number
+        """Controllers that are due together are updated in this order."""
         self.guard = Guard(f"controller '{name}'")
         self.handle = handle
         self.running = False

@@ -9,13 +9,15 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
 from ..config import Config
-from ..hardware.mavlink.message_table import COMMAND_IDS, WANTED_IDS
+from ..hardware.mavlink.message_table import COMMAND_IDS
 from ..hardware.mavlink.state.claims import Claims
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
+from ..mavlink.framing import Frame
 from ..mavlink.signing import ACCEPTED, Verdict
 from .arrival import BATCH, USUAL, Arrivals, Pause
-from .endpoint import Endpoint
+from .endpoint import ACTIVE, Endpoint
+from .kernel_filter import why_not
 from .routing import Router
 from .sender import Sender, speaks_for
 from .signing_policy import proof
@@ -27,14 +29,18 @@ if TYPE_CHECKING:
     from ..hardware.mavlink.requests.scheduler import Ask
     from ..hardware.mavlink.vehicle import TrackedVehicle
     from ..links.base import Address
-    from ..mavlink.framing import Frame
     from .endpoint import Channel
     from .observer import Observer
 
+    Heard = list[tuple[Frame, Channel]]
+
 log = logging.getLogger(__name__)
 
+new: Final = tuple.__new__  # as in `framing`
 NONE: Final[frozenset[tuple[int, int]]] = frozenset()
 REQUEST_SIZE: Final = 45  # bytes of a COMMAND_LONG
+STREAMED: Final = 40
+"""Bytes of a stream that count as one datagram: a usual frame."""
 SETUP_SIGNING: Final = 256
 """This message contains a key. It is never recorded or forwarded."""
 
@@ -60,13 +66,31 @@ class LinkHub:
         self._requests: set[tuple[Channel, int]] = set()
         self._channels: tuple[Channel, ...] | None = None
         """The channels to which frames may be forwarded. None: not collected yet."""
+        self._audiences: tuple[Audience, ...] | None = None
+        """The receivers of statuses. None: not collected yet."""
         self._router: Router[Channel] | None = None
         self._keep_all = False
+        self._relays = False
+        """Whether all frames are only forwarded: none is recorded, and none needs a signature."""
+        self.has_passive = False
+        """Whether nothing may be sent on one of the links."""
+        self.is_plain = False
+        """Whether `receive_one` may be used: nobody but the hardware interface sees the frames."""
+        self.pieces = 0
+        """Datagrams that the last `receive` has read; of a stream, those that it would fill."""
+        self.open(config)
+
+    def open(self, config: Config) -> None:
+        """Open everything of this configuration: the outs first, the links to vehicles last.
+
+        Raises LinkError, UsageError. After an error nothing stays open.
+        """
         try:
             self.change(config)
-        except BaseException:  # after an error nothing stays open
+        except BaseException:
             for endpoint in self.endpoints:
                 endpoint.link.close()
+            self.endpoints = []
             self.sender.close()
             raise
 
@@ -78,6 +102,7 @@ class LinkHub:
         before, self.config = self.config, config
         self.offered = frozenset({HEARTBEAT} if config.identity.heartbeat else ())
         self._keep_all = config.forward or config.record is not None
+        filters = why_not(config, observed=bool(self._observers)) is None
         places = [*((link, False) for link in config.links), *((out, True) for out in config.outs)]
         rest = list(self.endpoints)
         kept = [_take_out(rest, link.url, is_out) for link, is_out in places]
@@ -86,19 +111,29 @@ class LinkHub:
         if not config.forward or self._router is None or rest:
             self._router = Router() if config.forward else None
         self.sender.change(config, before)
-        for number, ((link, is_out), endpoint) in enumerate(zip(places, kept, strict=True)):
+        opened = []
+        for number, ((link, is_out), endpoint) in sorted(
+            enumerate(zip(places, kept, strict=True)), key=lambda row: not row[1][0][1]
+        ):
             if endpoint is not None:
-                endpoint.adjust(link, number, keep_all=self._keep_all)
+                endpoint.adjust(link, number, keep_all=self._keep_all, filters=filters)
                 continue
-            endpoint = Endpoint(link, is_out, number, keep_all=self._keep_all)
+            endpoint = Endpoint(link, is_out, number, keep_all=self._keep_all, filters=filters)
             self.endpoints.append(endpoint)
-            log.info("%s%s", endpoint.link.text, " (passive)" if endpoint.passive else "")
+            opened.append(endpoint)
         self.endpoints.sort(key=lambda endpoint: endpoint.number)
+        for endpoint in sorted(opened, key=lambda endpoint: endpoint.number):
+            log.info("%s%s", endpoint.link.text, " (passive)" if endpoint.passive else "")
+        self._audiences = None
+        self.has_passive = any(endpoint.passive for endpoint in self.endpoints)
+        unsigned = self.sender.signing_policy is None
+        self.is_plain = unsigned and not (self._observers or self._keep_all)
+        self._relays = unsigned and self._router is not None and self.sender.recorder is None
 
     def _close(self, endpoints: list[Endpoint]) -> None:
         """Close links, and forget the vehicles heard only on them."""
         self._close_links(endpoints)
-        self._channels = None
+        self._channels = self._audiences = None
         self._requests = {(channel, ids) for channel, ids in self._requests if channel.endpoint in self.endpoints}
         for claims in self.claims.values():
             claims.keep(lambda channel: channel.endpoint in self.endpoints)
@@ -112,6 +147,26 @@ class LinkHub:
 
     # receiving
 
+    def receive_one(self, endpoint: Endpoint, now: Instant) -> Sequence[tuple[Frame, Channel]]:
+        """As `receive` with a limit of 1, while `is_plain`. Most datagrams arrive alone, and hold nothing of interest.
+
+        Only this path is that short: between a wake-up and the next one nearly all code runs from a cold cache.
+        """
+        link = endpoint.link
+        pieces = link.receive(1)
+        self.pieces = 1
+        if link.stream or not pieces:
+            return self.receive(endpoint, now, 1, lambda _: pieces)
+        data, source = pieces[0]
+        channel = endpoint.channel(source, now.mono)
+        if channel is None:
+            return self.receive(endpoint, now, 1, lambda _: pieces)
+        found: list[Any] = channel.parser.walk(data)
+        if not found:
+            return ()
+        frames = [new(Frame, values) for values in found]
+        return [(frame, channel) for frame in frames if self._accepts(frame, channel, now)]
+
     def receive(
         self,
         endpoint: Endpoint,
@@ -124,33 +179,27 @@ class LinkHub:
         Reads at most `limit` datagrams of USUAL bytes, or BATCH pieces of a stream. A limit of 1 makes a single system
         call. `read` replaces the `receive` of the link.
         """
-        heard: list[tuple[Frame, Channel]] = []
+        heard: Heard = []
         link = endpoint.link
         read = read or link.receive
+        self.pieces = 0
         while True:
             pieces = read(limit if limit < BATCH else BATCH)
+            self.pieces += sum(len(data) for data, _ in pieces) // STREAMED if link.stream else len(pieces)
             if self._observers:
                 self._observe(pieces, now)
             whole = _joined(pieces) if len(pieces) > 1 and not self._keep_all else pieces
-            for data, source in whole:
-                channel = endpoint.channel(source, now.mono)
-                if channel is not None:
-                    frames = channel.parser.feed(data)
-                else:
-                    channel, frames = endpoint.hear_stranger(data, source, now.mono)
-                    if channel is None:
-                        continue
-                if self._keep_all:
-                    frames = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
-                    self._record(frames, now)
-                if self.sender.signing_policy is not None:
-                    frames = self._believed(frames, channel, now)
-                if self._keep_all:
-                    self._forward(data, frames, channel, now)
-                    frames = [frame for frame in frames if frame.message_id in WANTED_IDS]
-                for frame in frames:
-                    if self._accepts(frame, channel, now):
-                        heard.append((frame, channel))
+            if self._relays:
+                self._relay(pieces, endpoint, now, heard)
+            else:
+                for data, source in whole:
+                    channel = endpoint.channel(source, now.mono)
+                    if channel is not None:
+                        frames = channel.parser.feed(data)
+                    else:
+                        channel, frames = endpoint.hear_stranger(data, source, now.mono)
+                    if channel is not None:
+                        self._hear(data, frames, channel, now, heard)
             if len(pieces) < BATCH:
                 break
             limit = 0 if link.stream else limit - max(BATCH, sum(len(data) for data, _ in pieces) // USUAL)
@@ -160,6 +209,54 @@ class LinkHub:
         if link.stream and link.due() <= now.mono:  # the connection has ended
             self.needs_turn = True
         return heard
+
+    def _relay(self, pieces: Sequence[tuple[bytes, Address]], endpoint: Endpoint, now: Instant, heard: Heard) -> None:
+        """Forward and hear pieces, while `_relays`. Most hold one frame, which takes a short path.
+
+        As `_hear` in all that it does, but without a list or a Frame for a frame that is only forwarded.
+        """
+        router, mono = self._router, now.mono
+        assert router is not None
+        for data, source in pieces:
+            channel = endpoint.channel(source, mono)
+            if channel is None:
+                channel, frames = endpoint.hear_stranger(data, source, mono)
+                if channel is not None:
+                    self._hear(data, frames, channel, now, heard)
+                continue
+            found: list[Any] = channel.parser.walk(data)
+            if len(found) != 1:
+                if found:
+                    self._hear(data, [new(Frame, values) for values in found], channel, now, heard)
+                continue
+            values = found[0]
+            message_id = values[0]
+            if message_id == SETUP_SIGNING:
+                continue
+            if channel.is_peer:
+                channels = self._channels
+                if channels is None:
+                    channels = self._collect_channels()
+                for target in router.destinations(values, channel, channels, mono):
+                    target.send(values[4])
+            if message_id in channel.wanted:
+                frame = new(Frame, values)
+                if self._accepts(frame, channel, now):
+                    heard.append((frame, channel))
+
+    def _hear(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant, heard: Heard) -> None:
+        """Record and forward the frames of one piece, and add those to `heard` that a status needs."""
+        if self._keep_all:
+            frames = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
+            self._record(frames, now)
+        if self.sender.signing_policy is not None:
+            frames = self._believed(frames, channel, now)
+        if self._keep_all:
+            self._forward(data, frames, channel, now)
+            frames = [frame for frame in frames if frame.message_id in channel.wanted]
+        for frame in frames:
+            if self._accepts(frame, channel, now):
+                heard.append((frame, channel))
 
     def receive_late(
         self, endpoint: Endpoint, now: Instant, limit: int
@@ -242,7 +339,7 @@ class LinkHub:
 
     def _note_heartbeat(self, channel: Channel, now: float) -> None:
         if channel.endpoint.heard(channel, now):
-            self._channels = None
+            self._channels = self._audiences = None
 
     def _handle_command(self, frame: Frame, channel: Channel) -> None:
         """Handle a command that is addressed to us, and acknowledge it."""
@@ -253,7 +350,8 @@ class LinkHub:
             return
         for reply in found.replies:
             self.send_to(channel, reply, found.system)
-        channel.interval = found.interval
+        if found.interval != channel.interval:
+            channel.interval, self._audiences = found.interval, None
         if found.once == HEARTBEAT:
             self.sender.send_heartbeat(channel, found.system)
         elif found.once == ROBOT_STATUS:
@@ -271,35 +369,43 @@ class LinkHub:
         """Forward frames by MAVLink's routing rules."""
         if self._router is None or not channel.is_peer:
             return
-        if self._channels is None:
-            self._channels = tuple(channel for endpoint in self.endpoints for channel in endpoint.peers())
+        channels = self._collect_channels() if self._channels is None else self._channels
         whole = b"" if channel.endpoint.link.stream else data
-        for part, targets in self._router.plan(whole, frames, channel, self._channels, now.mono):
+        for part, targets in self._router.plan(whole, frames, channel, channels, now.mono):
             for target in targets:
                 target.send(part)
+
+    def _collect_channels(self) -> tuple[Channel, ...]:
+        """The channels to which frames may be forwarded; the same tuple until `_channels` is None again."""
+        self._channels = tuple(channel for endpoint in self.endpoints for channel in endpoint.peers())
+        return self._channels
 
     # sending
 
     def passive_vehicles(self) -> frozenset[tuple[int, int]]:
         """The vehicles on passive links. Nothing may be sent to them."""
-        if not any(endpoint.passive for endpoint in self.endpoints):
+        if not self.has_passive:
             return NONE
         return frozenset(ids for ids, claims in self.claims.items() if claims.way is None or claims.way.passive)
 
-    def audiences(self) -> list[Audience]:
+    def audiences(self) -> Sequence[Audience]:
         """The receivers of statuses: peers and outs. Not serial vehicle links: autopilots drop unknown ids."""
-        return [
-            Audience(channel, channel.interval, endpoint.is_out, None if endpoint.is_out else channel.systems)
-            for endpoint in self.endpoints
-            if self._gets_statuses(endpoint)
-            for channel in endpoint.peers()
-        ]
+        if self._audiences is None:
+            self._audiences = tuple(
+                Audience(channel, channel.interval, endpoint.is_out, None if endpoint.is_out else channel.systems)
+                for endpoint in self.endpoints
+                if self._gets_statuses(endpoint)
+                for channel in endpoint.peers()
+            )
+        return self._audiences
 
     def _gets_statuses(self, endpoint: Endpoint) -> bool:
         return not endpoint.passive and (endpoint.is_out or endpoint.robot_status)
 
     def requests(self) -> set[tuple[Channel, int]]:
         """`MavlinkPort`: the requests for one status since the last call, as channel and system."""
+        if not self._requests:  # asked in every turn
+            return self._requests
         requests, self._requests = self._requests, set()
         return requests
 
@@ -314,16 +420,28 @@ class LinkHub:
 
     def speak(self, vehicles: Sequence[TrackedVehicle], now: float) -> None:
         """Send our heartbeats, and what waited for its turn. Called once a second."""
+        heard = self._heard_lately(now)
         for endpoint in self.endpoints:
             endpoint.forget_silent(now)
+            endpoint.review_filter(now, heard=endpoint in heard)
             for channel in endpoint.channels():
                 channel.systems.clear()
-        self._channels = None
+                channel.quiet = False
+        self._channels = self._audiences = None
         for tracked in vehicles:
             path = self.way_of(tracked.ids) if tracked.ids is not None and speaks_for(tracked) else None
             if path is not None and tracked.ids is not None:
-                path.systems.add(tracked.ids[0])
+                if tracked.costly:
+                    path.quiet = True
+                else:
+                    path.systems.add(tracked.ids[0])
         self.sender.speak(self.endpoints, vehicles, self.config.identity.heartbeat)
+
+    def _heard_lately(self, now: float) -> set[Endpoint]:
+        """The links on which heartbeats of vehicles arrive, also those that are only claims."""
+        claims = [claim for one in self.claims.values() for claim in (one.mine, *one.others.values())]
+        ways = {claim.way for claim in claims if claim is not None and now - claim.at <= ACTIVE}
+        return {way.endpoint for way in ways if way is not None}
 
     def ask(self, request: Ask) -> None:
         """Send a request to a vehicle."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import ConfigError, MavRobotStatusError, UsageError
 from ..hardware.combined import CombinedRobotHW
+from ..hardware.group import Group
 from ..interface import HardwareContext
 from . import plugins
 from .guarded_hardware import GuardedHardware
@@ -38,17 +39,24 @@ def open_interface(config: HardwareConfig, *, replay: bool = False, clock: Calla
         raise ConfigError(f"{what}: {type(error).__name__}: {error}") from error
 
 
-def combined(first: HardwareInterface, others: Iterable[HardwareInterface]) -> HardwareInterface:
-    """All interfaces as one. MAVLink alone is returned unchanged, to stay fast."""
+def combined(config: Config, first: HardwareInterface, others: Iterable[HardwareInterface]) -> HardwareInterface:
+    """All interfaces as one, with the groups. MAVLink alone is returned unchanged, to stay fast."""
     parts = (first, *others)
-    return CombinedRobotHW(parts) if len(parts) > 1 else first
+    if len(parts) == 1 and not config.groups:
+        return first
+    component = config.identity.component
+    groups = [Group(name, group.handles, group.fields, component) for name, group in config.groups.items()]
+    return CombinedRobotHW(parts, groups)
 
 
 class LiveHardware:
     """The open hardware interfaces."""
 
     def __init__(self, config: Config, clock: Callable[[], Instant], observers: Sequence[Observer] = ()) -> None:
-        """Open everything. Raises LinkError, ConfigError, UsageError; after an error nothing stays open."""
+        """Open everything but the MAVLink links, see `open`.
+
+        Raises LinkError, ConfigError, UsageError; after an error nothing stays open.
+        """
         self._clock = clock
         self._open: dict[Key, GuardedHardware] = {}
         """Third parties' hardware interfaces."""
@@ -56,12 +64,19 @@ class LiveHardware:
         self.config = config
         """The present configuration."""
         with ExitStack() as opened:
-            self.mavlink = MavlinkHardware(config, clock, observers)
+            self.mavlink = MavlinkHardware(config, clock, observers, opens=False)
             opened.callback(self._close_all)
             self._open_new(config)
             opened.pop_all()
-        self.all = combined(self.mavlink, self._open.values())
+        self.all = combined(self.config, self.mavlink, self._open.values())
         """All of them as one."""
+
+    def open(self) -> None:
+        """Open the MAVLink links, after the outputs: if an output fails, no vehicle hears of us.
+
+        Raises LinkError, UsageError.
+        """
+        self.mavlink.open()
 
     def change(self, config: Config) -> None:
         """Open the interfaces that are new in this configuration, and retire those that it lacks.
@@ -81,7 +96,7 @@ class LiveHardware:
         while self._retired:
             self._retired.pop().close()
         self.mavlink.renew()
-        self.all = combined(self.mavlink, self._open.values())
+        self.all = combined(self.config, self.mavlink, self._open.values())
         return self.all
 
     def close(self) -> None:

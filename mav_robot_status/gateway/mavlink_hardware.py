@@ -9,17 +9,23 @@ import logging
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from ..config import Config
 from ..hardware.mavlink.interface import MavlinkRobotHW
+from ..hardware.mavlink.px4_events.parsing import parse
 from ..hardware.mavlink.vehicle import ExpectedVehicle
 from ..mavlink.commands import ROBOT_STATUS
 from .controller_config import publishes
+from .event_table_cache import EventTableCache, default_folder
+from .event_table_file import event_table
+from .event_tables import EventTables
 from .link_hub import LinkHub
+from .pace import MOST_AT_ONCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..clock import Instant
-    from ..config import Config
+    from ..hardware.mavlink.px4_events import EventTable
     from ..hardware.mavlink.state.claims import Claims
     from ..interface import IndustrialRobotStatusInterface, IoSource
     from ..mavlink.framing import Frame
@@ -33,22 +39,48 @@ HEARTBEAT_PERIOD: Final = 1.0  # s
 FIRST_SILENCE, LATER_SILENCE = 3.5, 30.0  # s without an autopilot until the first log line, and between later ones
 
 
-def robot_hw(config: Config, claims: dict[tuple[int, int], Claims[Any]] | None = None) -> MavlinkRobotHW:
-    """The vehicles of a configuration, in the state before the first heartbeat."""
-    slots = [ExpectedVehicle(v.system, v.component, v.handle) for v in config.vehicles]
-    vehicles = MavlinkRobotHW(config.hardware, slots, config.identity.component, claims)
+def robot_hw(
+    config: Config,
+    claims: dict[tuple[int, int], Claims[Any]] | None = None,
+    table: EventTable | None = None,
+) -> MavlinkRobotHW:
+    """The vehicles of a configuration, in the state before the first heartbeat.
+
+    `table` is that of the configuration, if it was read already. Raises UsageError if it cannot be read.
+    """
+    slots = [ExpectedVehicle(v.system, v.component, v.handle, v.name) for v in config.vehicles]
+    vehicles = MavlinkRobotHW(config.hardware, slots, config.identity.component, claims, config.names)
     vehicles.speak_as(config.identity.system, config.identity.component)
+    vehicles.link_timeout = _link_timeout(config)
+    vehicles.use_event_table(None, table or event_table(config))
     return vehicles
+
+
+def _link_timeout(config: Config) -> Callable[[Any], float | None] | None:
+    """The heartbeat timeout of the link of a way; None if no link has one. A log has one way, which is None."""
+    if all(link.heartbeat_timeout is None for link in config.links):
+        return None
+    of_log = config.links[0].heartbeat_timeout
+    return lambda way: of_log if way is None else way.endpoint.heartbeat_timeout
+
+
+def wants_tables(config: Config) -> bool:
+    """Whether a PX4 is asked for the table of its events: not if a file has it."""
+    return config.requests == "missing" and config.hardware.px4_events is None
 
 
 class MavlinkHardware:
     """A `HardwareInterface`: the vehicles on the links of a configuration. Each link is a source."""
 
-    def __init__(self, config: Config, clock: Callable[[], Instant], observers: Sequence[Observer] = ()) -> None:
-        """Open the links. Raises LinkError, UsageError."""
-        self.hub = LinkHub(config, clock, observers)
-        self.vehicles = robot_hw(config, self.hub.claims)
+    def __init__(
+        self, config: Config, clock: Callable[[], Instant], observers: Sequence[Observer] = (), *, opens: bool = True
+    ) -> None:
+        """Open the links; with `opens` False only `open` does it. Raises LinkError, UsageError."""
+        self._event_table = event_table(config)
+        self.hub = LinkHub(config if opens else Config(), clock, observers)
+        self.vehicles = robot_hw(config, self.hub.claims, self._event_table)
         self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
+        self.tables = EventTables(self.hub, self._use_table, parse, cache=EventTableCache(default_folder()))
         self.changed = False
         self.observers = observers
         self._waiting: list[tuple[Instant, Frame, Channel]] = []
@@ -60,13 +92,29 @@ class MavlinkHardware:
         self._silent_at = clock().mono + FIRST_SILENCE
         self._configure(config)
 
+    def open(self) -> None:
+        """Open the links, once. Raises LinkError, UsageError."""
+        self.hub.open(self._config)
+        self._configure(self._config)
+
     def _configure(self, config: Config) -> None:
         self._config = config
         self.vehicles.asks = config.requests == "missing" and not all(link.passive for link in config.links)
         self._timer_due = AT_ONCE
+        self._want_tables(config)
         if publishes(config, "mavlink"):
             self.hub.offered |= {ROBOT_STATUS}
         self._sources = tuple(LinkSource(endpoint, self) for endpoint in self.hub.endpoints)
+
+    def _want_tables(self, config: Config) -> None:
+        """Whether the tables of PX4's events are looked for, in the cache and on the vehicles."""
+        self.tables.wanted = wants_tables(config)
+        self.vehicles.ask_for_tables(self.tables.wanted)
+        self.vehicles.hear_file = self.tables.heard
+
+    def _use_table(self, ids: tuple[int, int], table: EventTable) -> None:
+        """A vehicle has this table of events."""
+        self.vehicles.use_event_table(ids, table)
 
     # reload
 
@@ -76,16 +124,21 @@ class MavlinkHardware:
         Afterwards call `read`, publish the last statuses, and call `renew`. Raises LinkError, UsageError. After an
         error some links are closed: change back.
         """
+        table = event_table(config)
         self.hub.change(config)
+        # a frame of a closed link that waits would bring its vehicle back
+        self._waiting = [one for one in self._waiting if one[2].endpoint in self.hub.endpoints]
+        self._event_table = table
         self.vehicles.forget(self.hub.vehicles())
         self.vehicles.changed = True
         self._configure(config)
 
     def renew(self) -> None:
         """Use the vehicles and options of the new configuration. Vehicles in both keep their state."""
-        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.claims)
+        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.claims, self._event_table)
         self.vehicles.adopt(before)
         self.vehicles.asks = before.asks
+        self._want_tables(self._config)
         self.handles = self.vehicles.handles
 
     # receiving
@@ -140,10 +193,13 @@ class MavlinkHardware:
 
     def write(self, now: Instant) -> None:
         """Send the due requests and heartbeats."""
-        if self.vehicles.asks:
+        if self.vehicles.asks and (self.hub.has_passive or now.mono >= self.vehicles.requests_due):
             for ask in self.vehicles.due_requests(now, self.hub.passive_vehicles(), self.hub.may_ask):
                 # the autopilot acknowledges to these ids
                 self.vehicles.speak_as(self._config.identity.system, self.hub.sender.component.id)
+                self.hub.ask(ask)
+        if now.mono >= self.tables.next_due:
+            for ask in self.tables.due(now.mono, self.vehicles.find):
                 self.hub.ask(ask)
         if self.hub.sender.signing_policy is not None:
             self.hub.sender.signing_policy.keep()
@@ -170,8 +226,10 @@ class MavlinkHardware:
         """When there is something to do. At once (-inf) after a frame that may change a status."""
         if self.hub.needs_turn:
             return AT_ONCE
-        due = self.vehicles.next_due(until)
-        return due if due < self._timer_due else self._timer_due
+        # compared without `min`: asked after each wake-up
+        timer = self._timer_due if self._timer_due < self.tables.next_due else self.tables.next_due
+        due = self.vehicles.next_due(until if until < timer else timer)
+        return due if due < timer else timer
 
     def explain(self, handle: str, now: Instant) -> None:
         """Update the evidence in this handle to `now`."""
@@ -179,7 +237,7 @@ class MavlinkHardware:
 
     def waits_for(self) -> list[str]:
         """What the vehicles were asked for and may still answer, one line for each vehicle."""
-        return self.vehicles.waits_for() if self.vehicles.asks else []
+        return [*self.vehicles.waits_for(), *self.tables.waits_for()] if self.vehicles.asks else []
 
     def forget(self) -> None:
         """Forget all vehicles."""
@@ -191,6 +249,7 @@ class MavlinkHardware:
             if vehicle.losses and vehicle.ids is not None:
                 times = "once" if vehicle.losses == 1 else f"{vehicle.losses} times"
                 log.info("vehicle %d.%d was lost %s", *vehicle.ids, times)
+        self.tables.close()
         self.hub.close()
 
 
@@ -206,14 +265,21 @@ class LinkSource:
         self._hub = hardware.hub
         self.fileno, self.next_due, self.close = endpoint.link.fileno, endpoint.link.due, endpoint.link.close
 
-    def receive(self, now: Instant, limit: int) -> None:
-        """Read the pending input, and process its frames."""
-        if self._hub.late:
+    def receive(self, now: Instant, limit: int) -> int:
+        """Read the pending input, and process its frames. Returns the number of datagrams."""
+        hub = self._hub
+        if hub.late:
             self._hardware.receive_late(self._endpoint, now, limit)
-            return
-        heard = self._hub.receive(self._endpoint, now, limit)
-        if not heard:
-            return
+            return MOST_AT_ONCE
+        if limit == 1 and hub.is_plain:
+            heard = hub.receive_one(self._endpoint, now)
+        else:
+            heard = hub.receive(self._endpoint, now, limit)
+        if heard:
+            self._take(heard, now)
+        return hub.pieces
+
+    def _take(self, heard: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
         hardware = self._hardware
         if self._endpoint.connections != self._connections:
             self._connections = self._endpoint.connections

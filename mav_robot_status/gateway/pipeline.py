@@ -8,10 +8,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from contextlib import ExitStack, contextmanager
+from itertools import count
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from ..clock import Instant
 from ..controller import IndustrialRobotStatusController
+from ..due_times import DueTimes
 from ..errors import ConfigError, MavRobotStatusError
 from ..interface import InterfaceManager, LinkState, PublisherContext
 from ..interface.explanation import explanation
@@ -30,14 +33,17 @@ from .controller_config import (
 )
 from .guarded_controller import GuardedController
 from .guarded_publisher import GuardedPublisher
+from .single_handle import SingleHandles
+from .unread_handles import UnreadHandles
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from ..config import Config, ControllerConfig, PublisherConfig
     from ..interface import HardwareInterface, IndustrialRobotStatusHandle, MavlinkPort, Metrics, Publisher
     from .observer import Observer
 
+IN_ORDER: Final = attrgetter("number")
 NEVER: Final = Instant(0.0, 0)
 """The time of a pipeline that has not run yet."""
 
@@ -64,6 +70,7 @@ class Pipeline:
         self._context = PublisherContext({}, port, stdout, patient, self.explain, metrics)
         self.publishers: dict[tuple[str, str], Publisher] = {}
         self._observers = observers
+        self._numbers = count()
         self._service_due = math.inf
         self.now = NEVER
         """The instant of the last tick."""
@@ -80,17 +87,19 @@ class Pipeline:
         check_handles(config, self._named)
         self._interfaces = InterfaceManager()
         self._interfaces.register_interface(self.hw.handles)
+        self._single_handles = SingleHandles(config)
         self._configs = sorted(config.controllers or (DEFAULT_CONTROLLER,), key=has_no_durable_publisher)
+        self._unread = UnreadHandles(self._configs)
         self._controllers: list[GuardedController] = []
         self._idle: list[GuardedController] = []
         """The controllers that do not run."""
-        self._controllers_due = math.inf
+        self._due: DueTimes[GuardedController] = DueTimes()
         self._seen: dict[str, IndustrialRobotStatusHandle] = {}
         """The handles that have their controllers."""
         self._version = -1
         """The version of the handles at that time."""
         for controller in self._configs:  # before the first heartbeat, so that a faulty output fails at the start
-            self._publishers(controller)
+            self._publishers(publishers_of(controller), controller.where)
         self._serve_handles(NEVER)
 
     def change(self, config: Config, renewed: Callable[[], HardwareInterface], now: Instant) -> None:
@@ -129,13 +138,15 @@ class Pipeline:
         if self.hw.handles.version != self._version:
             self._serve_handles(now)
         self.now = now
-        if self._idle or self.hw.changed or now.mono >= self._controllers_due:
+        if self._idle or self.hw.changed or now.mono >= self._due.first:
             self._update(now)
         self._service_due = math.inf
         for publisher in self.publishers.values():
             again = publisher.service(now)
             if again is not None:
                 self._service_due = min(self._service_due, again)
+        if self._service_due <= now.mono:
+            self._look_again(now)
         for observer in self._observers:
             observer.on_tick(self.hw.handles, now)
 
@@ -146,7 +157,8 @@ class Pipeline:
         """
         if self.hw.changed or (self._idle and any(map(self._may_start, self._idle))):
             return now
-        return min(self.hw.next_due(until), self._service_due, self._controllers_due)
+        due = min(self._service_due, self._due.first)
+        return min(self.hw.next_due(min(until, due)), due)
 
     def forget(self, now: Instant) -> None:
         """Return to the state at the start: no robot was heard."""
@@ -169,17 +181,33 @@ class Pipeline:
         for controller in self._controllers:
             if controller.running:
                 controller.stop(now)
-        self._idle, self._controllers_due = list(self._controllers), math.inf
+        self._idle, self._due = list(self._controllers), DueTimes()
 
     def _update(self, now: Instant) -> None:
-        self.hw.changed = False
-        for controller in filter(self._may_start, self._idle):
-            controller.start(now)
-        self._idle = [controller for controller in self._idle if not controller.running]
-        for controller in self._controllers:
+        if self._idle or self.hw.changed:
+            self.hw.changed = False
+            for controller in filter(self._may_start, self._idle):
+                controller.start(now)
+            self._idle = [controller for controller in self._idle if not controller.running]
+            mono = now.mono  # no call for the many that are not concerned
+            concerned = [
+                c
+                for c in self._controllers
+                if c.handle.status is not c.status or c.handle.detail is not c.detail or mono >= c.due
+            ]
+        else:
+            concerned = sorted(self._due.until(now.mono), key=IN_ORDER)
+        for controller in concerned:
             if controller.running:
                 controller.update(now)
-        self._controllers_due = min((controller.due for controller in self._controllers), default=math.inf)
+                self._due.set(controller, controller.due)
+
+    def _look_again(self, now: Instant) -> None:
+        """Update all controllers in the next tick: a publisher may take periodic messages again."""
+        for controller in self._controllers:
+            if controller.running:
+                controller.due = now.mono
+                self._due.set(controller, now.mono)
 
     def _may_start(self, controller: GuardedController) -> bool:
         handle = controller.handle
@@ -196,6 +224,7 @@ class Pipeline:
             if name in self._seen:
                 continue
             self._seen[name] = handle
+            self._unread.note(name)
             for controller in self._configs:
                 if is_default(controller):
                     parameters = {**controller.parameters, "handle_name": name}
@@ -210,6 +239,7 @@ class Pipeline:
             if controller.handle.name in names and controller.running:
                 controller.update(now)
                 controller.stop(now)
+                self._due.set(controller, math.inf)
         self._controllers = [c for c in self._controllers if c.handle.name not in names]
         self._idle = [c for c in self._idle if c.handle.name not in names]
         for publisher in self.publishers.values():
@@ -223,18 +253,19 @@ class Pipeline:
     def _add_controller(self, config: ControllerConfig) -> None:
         """Raises ConfigError if the controller cannot be made."""
         make = plugins.load(plugins.CONTROLLERS, config.type, config.where)
-        publishers = self._publishers(config)
+        served = [p for p in publishers_of(config) if self._single_handles.serves(p, config)]
+        publishers = self._publishers(served, config.where)
         with _as_config_error(f"{config.where}: controller '{config.name}'"):
             controller = make()
             controller.init(self._interfaces, config.parameters, publishers)
-            self._controllers.append(GuardedController(config.name, controller, controller.handle))
+            self._controllers.append(GuardedController(config.name, controller, controller.handle, next(self._numbers)))
             self._idle.append(self._controllers[-1])
 
-    def _publishers(self, config: ControllerConfig) -> list[Publisher]:
-        """The publishers of a controller, durable ones first. A replay leaves out those that are `live_only`."""
-        wanted = [p for p in publishers_of(config) if not (self._context.patient and is_live_only(p, config.where))]
-        wanted.sort(key=lambda p: not is_durable(p, config.where))
-        return [self._publisher(p, config.where) for p in wanted]
+    def _publishers(self, configs: Iterable[PublisherConfig], where: str) -> list[Publisher]:
+        """The publishers, durable ones first. A replay leaves out those that are `live_only`."""
+        wanted = [p for p in configs if not (self._context.patient and is_live_only(p, where))]
+        wanted.sort(key=lambda p: not is_durable(p, where))
+        return [self._publisher(p, where) for p in wanted]
 
     def _publisher(self, config: PublisherConfig, where: str) -> Publisher:
         """The existing publisher, or a new one."""

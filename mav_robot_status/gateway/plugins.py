@@ -6,7 +6,6 @@ without a scan of all installed packages.
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from typing import Any, Final
 
@@ -20,7 +19,10 @@ MAVLINK: Final = "mavlink"
 """The type of the MAVLink hardware interface. It has no entry point, because it needs the links of a gateway."""
 
 OURS: Final[dict[str, dict[str, str]]] = {
-    HARDWARE: {},
+    HARDWARE: {
+        "simple_message": "mav_robot_status.hardware.simple_message.interface:SimpleMessageRobotHW",
+        "ur": "mav_robot_status.hardware.ur.interface:UrRobotHW",
+    },
     CONTROLLERS: {
         "mav_robot_status/IndustrialRobotStatusController": (
             "mav_robot_status.controller:IndustrialRobotStatusController"
@@ -37,6 +39,8 @@ OURS: Final[dict[str, dict[str, str]]] = {
         "mirror": "mav_robot_status.publishers.named_value:NamedValuePublisher",
         "mqtt": "mav_robot_status.publishers.mqtt.publisher:MqttPublisher",
         "queue": "mav_robot_status.publishers.queue:QueuePublisher",
+        "simple_message": "mav_robot_status.publishers.simple_message.publisher:SimpleMessagePublisher",
+        "ros2": "mav_robot_status.publishers.ros.publisher:Ros2Publisher",
     },
 }
 
@@ -55,6 +59,8 @@ def load(group: str, name: str, where: str) -> Any:
             return found[name].load()
         except Exception as error:  # a third party's module may raise anything on import
             raise ConfigError(f"{where}: cannot load '{name}' ({found[name].value}): {error}") from error
+    import difflib
+
     names = sorted({*found, *OURS[group], *([MAVLINK] if group == HARDWARE else [])})
     near = difflib.get_close_matches(name, names, 1)
     hint = f"did you mean '{near[0]}'?" if near else "registered: " + ", ".join(f"'{n}'" for n in names)
@@ -62,7 +68,7 @@ def load(group: str, name: str, where: str) -> Any:
 
 
 def declares(made: object, attribute: str) -> bool:
-    """Whether a publisher class sets a flag, `live_only` or `durable`. The default is False."""
+    """Whether a publisher class sets a flag: `live_only`, `durable` or `one_handle`. The default is False."""
     return bool(getattr(made, attribute, False))
 
 

@@ -66,7 +66,7 @@ class ReplayPipeline(Pipeline):
         """Make the parts. Hardware interfaces other than MAVLink register their handles and open nothing."""
         self.vehicles = robot_hw(config)
         others = [open_interface(interface, replay=True, clock=lambda: self.now) for interface in config.interfaces]
-        hw = combined(self.vehicles, others)
+        hw = combined(config, self.vehicles, others)
         self.max_gap = config.max_gap
         super().__init__(config, hw, NoMavlinkPort(), stdout, patient=True, observers=observers)
 
@@ -85,28 +85,32 @@ class ReplayPipeline(Pipeline):
 def run_through(pipeline: ReplayPipeline, recording: Iterable[Stamped]) -> Instant:
     """Feed a recording to the pipeline. Returns the last instant; everything due before it is done."""
     hw = pipeline.vehicles
-    take = hw.take
+    records = iter(recording)
     last = NEVER
     due = -math.inf  # time starts at the first record
-    for now, frame, new_segment in recording:
-        mono = now.mono
-        if new_segment:
-            pipeline.forget(last)
-        elif due < mono or hw.deadline < mono:
-            if last is NEVER:
-                pipeline.tick(now)  # publish configured vehicles before their first heartbeat
-                last = now
-            due = pipeline.next_due(last.mono, mono)
-            if due < mono:
-                run_until(pipeline, last, now)
-                due = pipeline.next_due(mono)
-        if frame is not None:
-            take(frame, now)
-            if hw.dirty_vehicles:
-                pipeline.tick(now)
-                due = pipeline.next_due(mono)
-        last = now
-    return last
+    while True:
+        last, record = hw.take_all(records, last, due)
+        if record is not None:
+            now, frame, new_segment = record
+            mono = now.mono
+            if new_segment:
+                pipeline.forget(last)
+            elif due < mono or hw.deadline < mono:
+                if last is NEVER:
+                    pipeline.tick(now)  # publish configured vehicles before their first heartbeat
+                    last = now
+                due = pipeline.next_due(last.mono, mono)
+                if due < mono:
+                    run_until(pipeline, last, now)
+                    due = pipeline.next_due(mono)
+            if frame is not None:
+                hw.take(frame, now)
+            last = now
+        elif not hw.dirty_vehicles:
+            return last
+        if hw.dirty_vehicles:
+            pipeline.tick(last)
+            due = pipeline.next_due(last.mono)
 
 
 def run_until(pipeline: ReplayPipeline, last: Instant, until: Instant) -> None:

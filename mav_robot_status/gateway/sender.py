@@ -94,7 +94,7 @@ class Sender:
         """Renew the allowances; send our heartbeats, then what waits. Called once a second.
 
         A heartbeat for a system goes to the channels on which its vehicles are heard, and to the outs. On a link that
-        must send first there is one even without a vehicle.
+        must send first there is one even without a vehicle, unless it is `quiet`.
         """
         self.component.pass_second()
         in_error: dict[int, bool] = {}
@@ -119,7 +119,7 @@ class Sender:
                 if endpoint.is_out or system in channel.systems:
                     own = self.component.system_for(system)
                     ours[own] = ours.get(own, False) or faulty
-            if not ours and endpoint.must_speak and not endpoint.is_out:
+            if not ours and endpoint.must_speak and not endpoint.is_out and not channel.quiet:
                 ours = {DEFAULT_SYSTEM: False}
             yield from ((channel, own, faulty) for own, faulty in ours.items())
 

@@ -7,7 +7,6 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from ..mavlink.signing import WORDS, Signer, Verdict, Verifier, is_signed
-from .signing_keys import StampStore, read_key, stamp_path
 
 if TYPE_CHECKING:
     from ..clock import Instant
@@ -25,6 +24,8 @@ class SigningPolicy:
 
     def __init__(self, config: SigningConfig, now: Instant) -> None:
         """Read the key. Raises UsageError if it cannot be read."""
+        from .signing_keys import StampStore, read_key, stamp_path
+
         key = read_key(config.key_file)
         self._store = StampStore(stamp_path(key))
         self._signer = Signer(key, config.link_id, self._store.start(now.unix_us))

@@ -6,7 +6,9 @@ keeps its place in the queue. So no vehicle starves, and nothing waits that is o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
+
+from mav_robot_status.values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

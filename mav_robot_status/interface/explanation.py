@@ -14,24 +14,27 @@ if TYPE_CHECKING:
 
 
 def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> dict[str, Any]:
-    """The status in a handle with its evidence. Ages are in seconds at `now`; UNKNOWN is None."""
+    """The status in a handle with its evidence. Ages are in seconds at `now`; UNKNOWN is None.
+
+    `members` is that of a JSON line: only a group has it.
+    """
     detail = handle.detail
+    group = {"members": list(detail.members)} if detail.members else {}
     return {
         "stamp": rfc3339(now.unix_us),
         "handle": handle.name,
         "system": detail.system,
         "component": detail.component,
         "vehicle": detail.vehicle.members(),
+        **group,
         "link": {
             "state": detail.link.value,
             "heartbeat_age": None if handle.heard_at is None else round(now.mono - handle.heard_at, 3),
         },
         "fields": {field.name: _field(handle, field, now.mono) for field in STATES},
         "error_code": handle.status.error_code,
-        "errors": [
-            {"code": e.code, "name": e.name, "text": e.text, "since": rfc3339(e.since_us)} for e in detail.errors
-        ],
-        "inhibits": [{"name": i.name, "text": i.text, "since": rfc3339(i.since_us)} for i in detail.inhibits],
+        "errors": [error.members() for error in detail.errors],
+        "inhibits": [inhibit.members() for inhibit in detail.inhibits],
     }
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
+
+from mav_robot_status.values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,9 +22,9 @@ class ConnectionMetrics(NamedTuple):
     peers: int
     """Peers that get messages from us."""
     frames: int
-    """Valid MAVLink frames."""
-    lost: int
-    """Sequence numbers that are missing."""
+    """Valid MAVLink frames that reached the gateway."""
+    lost: int | None
+    """Sequence numbers that are missing; None: not counted, because the kernel filters."""
     crc_errors: Mapping[int, int]
     """Frames with a bad CRC by message id. -1 counts the ids beyond the limit."""
     unknown: int
@@ -30,8 +32,8 @@ class ConnectionMetrics(NamedTuple):
     incompatible: int
     """Frames with an unknown incompatibility flag."""
     garbage_bytes: int
-    dropped: int
-    """Messages that could not be sent, and datagrams that the kernel dropped."""
+    dropped: int | None
+    """Messages that could not be sent, and datagrams that the kernel dropped; None: not known, because it filters."""
     said: int = 0
     """Bytes that we sent without being asked."""
     withheld: int = 0

@@ -13,12 +13,12 @@ The publisher class names it (`options_type = LampOptions`) and reads it (`LampO
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from ..errors import UsageError
+from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -105,6 +105,8 @@ def _declared(field: dataclasses.Field[Any], hint: Any) -> Declared:
 
 
 def _known(name: str, declared: Iterable[str]) -> str:
+    import difflib  # only for this message
+
     names = list(declared)
     near = difflib.get_close_matches(name, names, 1)
     if near:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, Protocol, TextIO
+
+from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Container, Hashable, Mapping, Sequence
@@ -18,16 +20,19 @@ class Publisher(Protocol):
     A publisher may have one more method, `forget(handle)`: this handle is gone, and no message of it follows. Its last
     message has the link state NEVER_SEEN. Release what belongs to the handle.
 
-    A publisher class may set two more attributes. Both default to False:
+    A publisher class may set three more attributes. All default to False:
 
     - `live_only`: a replay of a recorded log runs without this publisher. Set it if receivers use the
       messages as the present state of the robot: a ground station, a broker, a live page.
     - `durable`: the publisher stores each change before `publish` returns. Durable publishers run first, so that no
       other output shows a change that a crash can still lose.
+    - `one_handle`: the publisher gets the messages of one handle only, that of the first controller that names it. Set
+      it if receivers cannot tell whose status they get.
     """
 
     periodic: bool
-    """False: this publisher takes changes only, and no periodic messages."""
+    """False: this publisher takes changes only, and no periodic messages. It may become False at any time, and True in
+    a `service` that returns its `now`: the controllers are updated before the next one."""
 
     def busy(self) -> bool:
         """True while it cannot accept a message (a failed trylock of realtime_tools)."""
@@ -61,7 +66,10 @@ class MavlinkPort(Protocol):
     """Sends MAVLink with our identity."""
 
     def audiences(self) -> Sequence[Audience]:
-        """The present receivers of messages about vehicles."""
+        """The present receivers of messages about vehicles: the same object as before, if nothing has changed.
+
+        The caller does not change it.
+        """
 
     def requests(self) -> Collection[tuple[Hashable, int]]:
         """Requests for one ROBOT_STATUS since the last call: key of the audience, system id of the vehicle."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final, NamedTuple
+from typing import Any, Final
 
+from ..clock import rfc3339
+from ..values import NamedTuple
 from .fields import RobotMode, RobotStatus, TriState
 
 __all__ = [
@@ -40,6 +42,12 @@ class ErrorCause(NamedTuple):
     """The text that the robot's controller sent; None if it sent none."""
     since_us: int
     """When the cause became active: Unix microseconds."""
+    handle: str | None = None
+    """The member of a group that reports it; None for a single robot."""
+
+    def members(self) -> dict[str, str | int | None]:
+        """The members in JSON."""
+        return {"code": self.code, **_reason(self)}
 
 
 class Inhibit(NamedTuple):
@@ -51,6 +59,18 @@ class Inhibit(NamedTuple):
     """The text that the robot's controller sent; None if it sent none."""
     since_us: int
     """When the reason became active: Unix microseconds."""
+    handle: str | None = None
+    """The member of a group that reports it; None for a single robot."""
+
+    def members(self) -> dict[str, str | int | None]:
+        """The members in JSON."""
+        return _reason(self)
+
+
+def _reason(of: ErrorCause | Inhibit) -> dict[str, str | int | None]:
+    """What both have in JSON. `handle` is absent while it is None."""
+    said: dict[str, str | int | None] = {"name": of.name, "text": of.text, "since": rfc3339(of.since_us)}
+    return said if of.handle is None else {**said, "handle": of.handle}
 
 
 class Vehicle(NamedTuple):
@@ -71,13 +91,19 @@ class Vehicle(NamedTuple):
     """The state of the controller: MAV_STATE; of an arm, the controller's own name."""
     firmware: str | None = None
     """The version of the controller's firmware: `4.5.6`, `4.7.0-dev`."""
+    can_arm: bool | None = None
+    """Whether the checks before arming pass in the current mode, by the controller's latest report of them."""
+    modes_blocked: tuple[str, ...] | None = None
+    """The operating modes in which they fail, by the controller's own names."""
+    name: str | None = None
+    """What people call the robot: 1 to 40 printable characters. The configuration gives it."""
 
-    def members(self) -> dict[str, str | int | None]:
+    def members(self) -> dict[str, Any]:
         """The members in JSON. Those that were added later are absent while they are None."""
         return {name: value for name, value in self._asdict().items() if value is not None or name not in _ADDED}
 
 
-_ADDED: Final = frozenset({"firmware"})
+_ADDED: Final = frozenset({"firmware", "can_arm", "modes_blocked", "name"})
 
 
 class Evidence(NamedTuple):
@@ -104,6 +130,8 @@ class Detail(NamedTuple):
     """Empty while motion_possible is TRUE."""
     vehicle: Vehicle = Vehicle()
     link: LinkState = LinkState.CONNECTED
+    members: tuple[str, ...] = ()
+    """The handles of a group, see `hardware.group`. Empty for a single robot."""
 
 
 class RobotStatusMsg(NamedTuple):

@@ -17,15 +17,16 @@ IDS: Final = range(256)
 TRUE, FALSE = TriState.TRUE, TriState.FALSE
 
 
-def validate(status: RobotStatus, detail: Detail | None = None) -> str | None:
+def validate(status: RobotStatus, detail: Detail | None = None, *, stops_cut_power: bool = True) -> str | None:
     """The first invariant that a status and its detail violate, as a sentence; None if they are valid.
 
     A value of the wrong type is reported with the name of its field. Without a detail, the status alone is checked.
+    `stops_cut_power` is that of the hardware interface.
     """
-    found = _wrong_type(status) or _broken(status)
-    if found is not None or detail is None:
-        return found
-    return _wrong_detail(detail) or _contradiction(status, detail)
+    found = _wrong_type(status) or (None if detail is None else _wrong_detail(detail))
+    if found is None and (detail is None or not detail.members):
+        found = _powered_in_part(status, stops_cut_power)
+    return found or _broken(status) or (None if detail is None else _contradiction(status, detail))
 
 
 def _wrong_type(status: object) -> str | None:
@@ -44,11 +45,16 @@ def _wrong_type(status: object) -> str | None:
 _ENUMS: Final = {Kind.MODE: RobotMode, Kind.TRI_STATE: TriState}
 
 
-def _broken(status: RobotStatus) -> str | None:
-    if status.e_stopped is TRUE and status.drives_powered is not FALSE:
+def _powered_in_part(status: RobotStatus, stops_cut_power: bool) -> str | None:
+    """The invariants of a single robot. A group has some parts that are stopped beside others that are powered."""
+    if stops_cut_power and status.e_stopped is TRUE and status.drives_powered is not FALSE:
         return "I1: e_stopped is TRUE, so drives_powered must be FALSE"
     if status.drives_powered is FALSE and status.motion_possible is not FALSE:
         return "I2: drives_powered is FALSE, so motion_possible must be FALSE"
+    return None
+
+
+def _broken(status: RobotStatus) -> str | None:
     if (status.error_code != 0) != (status.in_error is TRUE):
         return "I3: error_code must be non-zero if in_error is TRUE, and 0 otherwise"
     return None
@@ -99,15 +105,26 @@ def _is_reason(value: object) -> bool:
         and isinstance(value.name, str)
         and isinstance(value.text, str | None)
         and type(value.since_us) is int
+        and isinstance(value.handle, str | None)
     )
 
 
 def _is_vehicle(value: object) -> bool:
     return (
         isinstance(value, Vehicle)
-        and all(isinstance(getattr(value, name), str | None) for name in Vehicle._fields if name != "custom_mode")
+        and all(isinstance(getattr(value, name), str | None) for name in _WORDS)
         and (value.custom_mode is None or type(value.custom_mode) is int)
+        and isinstance(value.can_arm, bool | None)
+        and (value.modes_blocked is None or _are_words(value.modes_blocked))
     )
+
+
+_WORDS: Final = tuple(name for name in Vehicle._fields if name not in ("custom_mode", "can_arm", "modes_blocked"))
+"""The members of a Vehicle that are texts."""
+
+
+def _are_words(value: object) -> bool:
+    return isinstance(value, tuple) and all(isinstance(word, str) for word in value)
 
 
 _MEMBERS: Final[tuple[tuple[str, Callable[[object], bool], str], ...]] = (
@@ -121,4 +138,5 @@ _MEMBERS: Final[tuple[tuple[str, Callable[[object], bool], str], ...]] = (
     ),
     ("vehicle", _is_vehicle, "a Vehicle"),
     ("link", lambda v: isinstance(v, LinkState), "a LinkState"),
+    ("members", lambda v: isinstance(v, tuple) and all(isinstance(i, str) for i in v), "a tuple of names of handles"),
 )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
+
+from mav_robot_status.values import NamedTuple
 
 Address = Hashable
 """The source of received bytes. Each connection of a stream has an address of its own, so that the bytes of two
@@ -84,3 +86,14 @@ class DatedLink(Protocol):
 
     def receive_dated(self, limit: int = 64) -> list[Dated]:
         """As `receive`, with stamps. It takes longer, so it is called only if input may be old."""
+
+
+@runtime_checkable
+class FilteredLink(Protocol):
+    """What a link of datagrams can offer besides `Link`: unneeded ones do not reach the process."""
+
+    def filter(self, program: bytes | None) -> bool:
+        """Drop the datagrams that this program rejects, before they are received; None: no longer.
+
+        False if the link cannot: then nothing changes.
+        """

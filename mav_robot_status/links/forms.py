@@ -15,15 +15,25 @@ DEFAULT_BAUD = 57600
 BARE_HOST_PORT = re.compile(r"(?:\[[^\]]*\]|[\w.-]+):[0-9]+", re.ASCII)
 ADDRESS = re.compile(r"[0-9]+(?:\.[0-9]+){3}|\[[0-9A-Fa-f:.%]+\]|localhost")
 # By-id and by-path names contain colons and small numbers (usb-0:1:1.0); a baud rate has at least four digits.
-DEVICE_BAUD = re.compile(r"(.*?)(?:,(.*)|:([0-9]{4,}))?", re.DOTALL)
+DEVICE_BAUD = re.compile(
+    r"(.*?)(?:,(.*?)|:([0-9]{4,})|\?baudrate=([0-9]+))?(?:[:,]([5-8][NEOMS](?:1|1\.5|2)))?", re.DOTALL | re.IGNORECASE
+)
+"""The device, its baud rate in one of three forms, and its frame format."""
+FRAME_FORMAT = "8N1"
+"""8 data bits, no parity, 1 stop bit: what MAVLink uses on serial lines."""
 _HOST_PORT = re.compile(r"(?:\[([0-9A-Fa-f:.]+(?:%[\w.-]+)?)\]|([\w.-]*)):([0-9]*)", re.ASCII)
 _MAVROS = re.compile(r"[^@]*?(?::([0-9]+))?@(.*)", re.DOTALL)
 
 
 def network(kind: LinkKind, text: str, rest: str, baud: int | None = None) -> Url:
-    """HOST:PORT. A listener may omit the host: it then listens on every address of this machine."""
+    """HOST:PORT. A listener may omit the host, and the colon: it then listens on every address of this machine."""
     if "@" in rest:
         _explain_mavros(text, kind, rest)
+    place, question, _ = rest.partition("?")
+    if question:
+        raise UsageError(f"{text!r}: options behind '?' are those of another program; write {kind.schemes[0]}:{place}")
+    if kind.listens and rest.isascii() and rest.isdigit():
+        rest = f":{rest}"
     found = _HOST_PORT.fullmatch(rest.rstrip("/"))
     if found is None:
         if rest.count(":") > 1 and "[" not in rest:
@@ -63,11 +73,15 @@ def _explain_mavros(text: str, kind: LinkKind, rest: str) -> NoReturn:
 
 
 def serial(kind: LinkKind, text: str, rest: str, baud: int | None = None) -> Url:
-    """DEVICE, DEVICE,BAUD or DEVICE:BAUD. A device that exists under the whole text wins."""
+    """DEVICE, DEVICE,BAUD or DEVICE:BAUD, and `:8N1` behind it. A device that exists under the whole text wins."""
     found = None if os.path.exists(rest) else DEVICE_BAUD.fullmatch(rest)
-    device, digits = (found[1], found[2] if found[2] is not None else found[3]) if found else (rest, None)
-    if not device.startswith(("/", ".")):
+    device, *rates, frame = found.groups() if found else (rest, None)
+    digits = next((rate for rate in rates if rate is not None), None)
+    if not device or not device.startswith(("/", ".")):
         raise UsageError(f"{text!r} names no device; write for example {kind.example}")
+    if frame is not None and frame.upper() != FRAME_FORMAT:
+        where = device if digits is None else f"{device}:{digits}"
+        raise UsageError(f"{text!r}: the frame format is {FRAME_FORMAT}, as MAVLink has it, not {frame}; write {where}")
     if digits is None:
         return Url(kind, "", 0, device, baud or DEFAULT_BAUD, text)
     if not re.fullmatch(r"[0-9]{1,8}", digits) or int(digits) == 0:

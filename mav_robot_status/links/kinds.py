@@ -25,8 +25,8 @@ def _refuse(url: Url) -> NoReturn:
 
 UDP_LISTENER: Final = LinkKind(
     "udpin",
-    ("udp", "udpin"),
-    forms="udp:H:P  udpin:H:P  udp://[H]:P  udpin://H:P",
+    ("udp", "udpin", "udpserver"),
+    forms=":P  udp:P  udp:H:P  udpin:H:P  udpserver:H:P  udp://[H]:P  udpin://H:P",
     words="listening on {where}/udp",
     example="udp:127.0.0.1:14550",
     description="listen on a UDP port",
@@ -37,8 +37,8 @@ UDP_LISTENER: Final = LinkKind(
 )
 UDP_SENDER: Final = LinkKind(
     "udpout",
-    ("udpout",),
-    forms="H:P  udpout:H:P  udpout://H:P",
+    ("udpout", "udpclient"),
+    forms="H:P  udpout:H:P  udpclient:H:P  udpout://H:P",
     words="sending to {where}/udp",
     example="udpout:192.168.1.20:14550",
     description="send to a UDP port",
@@ -62,8 +62,8 @@ UDP_BROADCASTER: Final = LinkKind(
 )
 TCP_CLIENT: Final = LinkKind(
     "tcp",
-    ("tcp", "tcpout"),
-    forms="tcp:H:P  tcpout://H:P",
+    ("tcp", "tcpout", "tcpclient"),
+    forms="tcp:H:P  tcpclient:H:P  tcpout://H:P",
     words="connecting to {where}/tcp",
     example="tcp:127.0.0.1:5760",
     description="connect to a TCP server",
@@ -74,8 +74,8 @@ TCP_CLIENT: Final = LinkKind(
 )
 TCP_SERVER: Final = LinkKind(
     "tcpin",
-    ("tcpin",),
-    forms="tcpin:H:P  tcpin://H:P",
+    ("tcpin", "tcpserver"),
+    forms="tcpin:P  tcpin:H:P  tcpserver:H:P  tcpin://H:P",
     words="listening on {where}/tcp",
     example="tcpin:0.0.0.0:5760",
     description="be a TCP server",
@@ -87,7 +87,7 @@ TCP_SERVER: Final = LinkKind(
 SERIAL: Final = LinkKind(
     "serial",
     ("serial",),
-    forms="/dev/ttyX[,BAUD]  /dev/ttyX:BAUD  serial:///dev/ttyX:BAUD",
+    forms="/dev/ttyX[,BAUD]  /dev/ttyX:BAUD[:8N1]  serial:/dev/ttyX:BAUD  serial:///dev/ttyX:BAUD",
     words="serial {device} at {baud} baud",
     example="/dev/ttyACM0,57600",
     description=f"a serial device; the default is {DEFAULT_BAUD} baud",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import os
 from contextlib import suppress
 
@@ -23,6 +22,8 @@ def device_owner(device: str) -> str:
 
 def _owner(files: set[str]) -> str:
     """The first process that has one of these files open."""
+    import glob  # only for this message
+
     for link in glob.iglob("/proc/[0-9]*/fd/*") if files else ():
         with suppress(OSError):  # the process has ended, or belongs to another user
             if os.readlink(link) in files:

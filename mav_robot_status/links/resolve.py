@@ -18,7 +18,8 @@ def addresses(host: str, port: int, kind: socket.SocketKind, flags: int = 0) -> 
 
     May block for a name. Raises OSError (unknown name) or ValueError (invalid name).
     """
-    found = socket.getaddrinfo(host, port, type=kind, flags=flags)
+    name = host.encode("ascii") if host.isascii() else host  # a str loads the tables of IDNA, a megabyte
+    found = socket.getaddrinfo(name, port, type=kind, flags=flags)
     return sorted(((family, where) for family, _, _, _, where in found), key=lambda target: target[0] != socket.AF_INET)
 
 

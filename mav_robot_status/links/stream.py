@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import itertools
 import math
 import os
 import select
@@ -89,8 +88,14 @@ class Reconnecting(ABC):
         """The last connection was lost before it was stable, and no attempt has failed since."""
         self._connection_lost = False
         """A connection was lost since the last `service`."""
-        self._numbers = itertools.count(1)
+        self.connections = 0
+        """The connections so far. It tells a new connection from the one before."""
         self._due = -math.inf
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a connection."""
+        return self._stream is not None
 
     @abstractmethod
     def _connect(self, now: float) -> None:
@@ -150,6 +155,12 @@ class Reconnecting(ABC):
             self._backoff.reset()
             self._state_log.up(f"connected to {self._where}")
 
+    def reconnect(self) -> None:
+        """End the connection, because what it carries is of no use, and connect again after a wait."""
+        if self._stream is not None:
+            self._drop()
+            self._connection_lost, self._due = True, -math.inf
+
     def close(self) -> None:
         """Close the connection."""
         self._drop()
@@ -157,7 +168,8 @@ class Reconnecting(ABC):
         self._epoll.close()
 
     def _connected(self, descriptor: int, now: float) -> None:
-        self._stream = Stream(self._epoll, descriptor, (self._where, next(self._numbers)))
+        self.connections += 1
+        self._stream = Stream(self._epoll, descriptor, (self._where, self.connections))
         self._stable = False
         self._due = now + STABLE_AFTER
         if not self._short_lived:

@@ -11,7 +11,7 @@ import select
 import socket
 from collections import Counter
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from mav_robot_status.links.base import Address, Received
 from mav_robot_status.links.listen import LocalPort
@@ -19,6 +19,7 @@ from mav_robot_status.links.retry import Backoff, RandomFraction, StateLog
 from mav_robot_status.links.stream import Stream, reason
 from mav_robot_status.links.tcp import tuned
 from mav_robot_status.links.url import Url, host_port
+from mav_robot_status.values import NamedTuple
 
 log = logging.getLogger(__name__)
 

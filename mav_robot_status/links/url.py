@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 import stat
@@ -10,6 +9,7 @@ from typing import NoReturn
 
 from mav_robot_status.errors import UsageError
 from mav_robot_status.links import kinds
+from mav_robot_status.links.foreign import WORDS, what_it_is
 from mav_robot_status.links.forms import ADDRESS, BARE_HOST_PORT, DEVICE_BAUD
 from mav_robot_status.links.kind import Url, host_port
 from mav_robot_status.links.kinds import BY_SCHEME, KINDS, LOG, SERIAL, UDP_LISTENER, UDP_SENDER
@@ -17,6 +17,10 @@ from mav_robot_status.links.kinds import BY_SCHEME, KINDS, LOG, SERIAL, UDP_LIST
 __all__ = ["KINDS", "Url", "help_text", "host_port", "parse"]
 
 _SCHEME = re.compile(r"([A-Za-z][\w+-]*):(?://)?(.*)", re.ASCII | re.DOTALL)
+_PORT_ALONE = re.compile(r":[0-9]+", re.ASCII)
+_GLUED = re.compile(r"([A-Za-z]+)([0-9]+(?:\.[0-9]+){3})", re.ASCII)
+NEARLY = 0.86
+"""How similar (1: equal) a host and a scheme are at least if the host is taken for a misspelt scheme."""
 _EXAMPLES = ", ".join(kind.example for kind in (UDP_LISTENER, SERIAL, LOG))
 
 
@@ -34,6 +38,10 @@ def parse(text: str, baud: int | None = None) -> Url:
     found = _SCHEME.fullmatch(text)
     scheme, rest = (found[1].lower(), found[2]) if found else ("", text)
     kind = BY_SCHEME.get(scheme)
+    if kind is None and scheme in WORDS and not (os.path.exists(text) or BARE_HOST_PORT.fullmatch(text)):
+        kind = kinds.installed(scheme)
+        if kind is None:
+            raise UsageError(what_it_is(text, scheme))
     if kind is None:
         if os.path.isfile(text) or text.lower().endswith(".tlog"):
             return LOG.url(text, text, baud)
@@ -42,16 +50,42 @@ def parse(text: str, baud: int | None = None) -> Url:
         kind = kinds.installed(scheme) if scheme else None
     if kind is not None:
         return kind.url(text, rest, baud)
+    if _PORT_ALONE.fullmatch(text):
+        return UDP_LISTENER.url(text, text, baud)
     if BARE_HOST_PORT.fullmatch(text):
+        _doubt_host(text)
         return UDP_SENDER.url(text, text, baud)
     return _refuse(text, scheme)
 
 
+def _doubt_host(text: str) -> None:
+    """Raise UsageError for a HOST:PORT whose host looks like a misspelt scheme: `upd:14550`, `udpin127.0.0.1:14550`."""
+    host, _, port = text.rpartition(":")
+    found = _GLUED.fullmatch(host)
+    if found is not None and found[1].lower() in BY_SCHEME:
+        raise UsageError(f"{text!r}: a colon is missing; write {found[1]}:{found[2]}:{port}")
+    if host.isalpha() and (near := next((one for one in BY_SCHEME if _is_misspelt(host.lower(), one)), None)):
+        raise UsageError(
+            f"{text!r}: unknown connection type {host}:; did you mean {near}: ? For a host write udpout:{text}"
+        )
+
+
+def _is_misspelt(word: str, scheme: str) -> bool:
+    """Whether letters are exchanged, or one letter is wrong at the end of a long word."""
+    from difflib import SequenceMatcher  # only a form that is not taken needs it
+
+    return sorted(word) == sorted(scheme) or SequenceMatcher(None, word, scheme).ratio() > NEARLY
+
+
 def _refuse(text: str, scheme: str) -> NoReturn:
-    """Raise UsageError for a text that is no connection string."""
+    """Raise UsageError for a text that is not a connection string."""
+    import difflib  # only for this message
+
     if scheme and (near := difflib.get_close_matches(scheme, kinds.schemes(), 1)):
         written = text[: len(scheme)]
         raise UsageError(f"{text!r}: unknown connection type {written}:; did you mean {near[0]}: ?")
+    if text.isascii() and text.isdigit():
+        raise UsageError(f"{text!r} is a port; write udp:{text} to listen there, or HOST:{text} to send")
     if ADDRESS.fullmatch(text):
         raise UsageError(f"{text!r} has no port; write {text}:14550 to send there, or udp:{text}:14550 to listen")
     if os.path.isdir(text):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
+
+from ..values import dataclass
 
 MAX_IDS: Final = 256
 """The most ids with a separate counter in each table of `Counters`."""

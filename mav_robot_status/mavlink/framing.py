@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import struct
 from binascii import crc_hqx
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
+
+from mav_robot_status.values import NamedTuple
 
 from .counters import Counters, count
 from .definitions import CRC_EXTRA
@@ -112,6 +114,11 @@ class Parser:
         self._expected: dict[int, int | None] = {}  # by source; the entry of the last source may be out of date
         self._keep_all = wanted is None
         self._known = known_ids(frozenset(CRC_EXTRA if wanted is None else wanted))
+
+    def want(self, ids: frozenset[int]) -> None:
+        """Return the frames of these ids from now on. A parser that keeps all frames does so anyway."""
+        if not self._keep_all:
+            self._known = known_ids(ids)
 
     @property
     def pending(self) -> int:

@@ -11,8 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 from enum import IntEnum
-from hashlib import sha256
-from hmac import compare_digest
 from typing import TYPE_CHECKING, Final
 
 from .definitions import CRC_EXTRA
@@ -84,13 +82,16 @@ def is_signed(frame: Frame) -> bool:
 class Signer:
     """The key and our time stamp. The stamps of the frames that we sign always rise, whatever the clock does."""
 
-    __slots__ = ("_key", "link_id", "stamp")
+    __slots__ = ("_key", "_sha256", "link_id", "stamp")
 
     def __init__(self, key: bytes, link_id: int, stamp: int = 0) -> None:
         """`stamp` is the last one that was used with this key. Raises ValueError if the key is not KEY_SIZE bytes."""
         if len(key) != KEY_SIZE:
             raise ValueError(f"a signing key has {KEY_SIZE} bytes, not {len(key)}")
+        from hashlib import sha256  # three megabytes, which most gateways do not need
+
         self._key = key
+        self._sha256 = sha256
         self.link_id = link_id
         """The link id of our first link."""
         self.stamp = stamp
@@ -117,16 +118,19 @@ class Signer:
 
     def signature(self, covered: bytes) -> bytes:
         """The signature, six bytes, of a frame whose other bytes are `covered`."""
-        return sha256(self._key + covered).digest()[:6]
+        return self._sha256(self._key + covered).digest()[:6]
 
 
 class Verifier:
     """Decides which frames to accept. One verifier serves all links, so a frame cannot be replayed on another."""
 
-    __slots__ = ("_signer", "_streams", "_unsigned", "counters")
+    __slots__ = ("_is_same", "_signer", "_streams", "_unsigned", "counters")
 
     def __init__(self, signer: Signer, accept_unsigned: str = "radio_status") -> None:
         """Shares the signer's key and time stamp. `accept_unsigned` is a key of UNSIGNED_IDS."""
+        from hmac import compare_digest
+
+        self._is_same = compare_digest
         self._signer = signer
         self._unsigned = UNSIGNED_IDS[accept_unsigned]
         self._streams: dict[bytes, int] = {}  # system, component, link id -> the last stamp
@@ -148,7 +152,7 @@ class Verifier:
 
     def _verify(self, raw: bytes, unix_us: int) -> Verdict:
         signer = self._signer
-        if not compare_digest(signer.signature(raw[:-6]), raw[-6:]):
+        if not self._is_same(signer.signature(raw[:-6]), raw[-6:]):
             return Verdict.FORGED
         stream = raw[5:7] + raw[-13:-12]
         stamp = int.from_bytes(raw[-12:-6], "little")

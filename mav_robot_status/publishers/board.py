@@ -9,11 +9,12 @@ from __future__ import annotations
 import json
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import rfc3339
 from ..interface import STATES
 from ..interface.options import Options
+from ..values import NamedTuple
 from .json_lines import native_body
 
 if TYPE_CHECKING:
@@ -23,9 +24,15 @@ if TYPE_CHECKING:
     from ..interface import PublisherContext, RobotStatusMsg
 
 MOST_HANDLES: Final = 4096
+MOST_MEMBERS: Final = 256
+"""Members that follow a group."""
 MOST_TRANSITIONS: Final = 500
 KEPT: Final = 600.0
 """Seconds for which transitions are kept: the time span of a view."""
+
+
+UNHEARD: Final = "LINK_STALE"
+"""The inhibit of a robot, or of a member of a group, that is not heard."""
 
 
 class Transition(NamedTuple):
@@ -46,7 +53,7 @@ class Transition(NamedTuple):
 class Entry:
     """The latest status of one handle."""
 
-    __slots__ = ("at", "began", "heartbeat_age", "line", "lines", "stamp", "transitions", "version")
+    __slots__ = ("at", "began", "heartbeat_age", "last", "line", "lines", "stamp", "transitions", "version")
 
     def __init__(self, now: float) -> None:
         self.began = now
@@ -55,6 +62,8 @@ class Entry:
         """The number of lines so far."""
         self.line: Mapping[str, Any] = {}
         """The members of its last native line with a change. `stamp` and `heartbeat_age` are kept separately."""
+        self.last: Mapping[str, Any] | None = None
+        """The last whole line with a connected link, once the link is lost; None before."""
         self.stamp = ""
         self.heartbeat_age: float | None = None
         self.at = 0.0
@@ -81,8 +90,14 @@ class Board:
         self._seen: dict[str, tuple[Any, Any]] = {}
 
     def __iter__(self) -> Iterator[Entry]:
-        """The entries by system, component and handle; those without ids last."""
-        return iter(sorted(self.entries.values(), key=_order))
+        """The groups, each with its members after it; then the other entries by system, component and handle.
+
+        Entries without ids come last. An entry occurs once: a member of two groups follows the first.
+        """
+        ordered = sorted(self.entries.values(), key=_order)
+        if not any(entry.line.get("members") for entry in ordered):
+            return iter(ordered)
+        return iter(dict.fromkeys(self._nested(ordered)))
 
     def update(self, msg: RobotStatusMsg, now: float) -> None:
         """Update the board with a status of this process."""
@@ -97,11 +112,18 @@ class Board:
         entry.stamp, entry.at = stamp, now
         entry.heartbeat_age = None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
 
-    def update_line(self, handle: str, line: Mapping[str, Any], now: float) -> None:
-        """Update the board with a parsed line of another process. `handle` replaces the handle in the line."""
+    def update_line(
+        self, handle: str, line: Mapping[str, Any], now: float, last: Mapping[str, Any] | None = None
+    ) -> None:
+        """Update the board with a parsed line of another process. `handle` replaces the handle in the line.
+
+        `last` is the last line with a connected link, if the board may not have seen it.
+        """
         entry = self._entry(handle, now)
         if entry is None:
             return
+        if entry.last is None:
+            entry.last = last
         stamp = str(line.get("stamp", ""))
         link = line.get("link")
         link = link if isinstance(link, dict) else {}
@@ -118,6 +140,15 @@ class Board:
         if self.entries.pop(handle, None) is not None:
             self.version += 1
 
+    def _nested(self, ordered: list[Entry]) -> Iterator[Entry]:
+        for entry in ordered:
+            members = entry.line.get("members")
+            if isinstance(members, list) and members:
+                yield entry
+                names = (name for name in members[:MOST_MEMBERS] if isinstance(name, str))
+                yield from (self.entries[name] for name in names if name in self.entries)
+        yield from ordered
+
     def _entry(self, handle: str, now: float) -> Entry | None:
         entry = self.entries.get(handle)
         if entry is None:
@@ -130,7 +161,12 @@ class Board:
 
     def _change(self, entry: Entry, line: Mapping[str, Any], stamp: str, now: float) -> None:
         transitions = entry.transitions
-        for name, value, before in _changes(entry.line, line):
+        known = entry.line
+        if not _is_connected(known):
+            known = entry.last or known
+        elif not _is_connected(line):
+            entry.last = entry.whole()
+        for name, value, before in (*_changes(entry.line, line), *_cause_changes(known, line)):
             transitions.append(Transition(now, stamp, name, value, before))
         while transitions and now - transitions[0].at > KEPT:
             transitions.popleft()
@@ -193,14 +229,28 @@ def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tu
         value, old_value = _member(after, group, name), _member(before, group, name)
         if not before or old_value != value:
             yield group if group == "link" else name, value, old_value
+
+
+def _cause_changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tuple[str, Any, None]]:
+    """Errors and inhibits that begin or end since `before`, the last line with a connected link.
+
+    Nobody knows whether a cause ends while its robot, or its member of a group, is not heard.
+    """
+    if not _is_connected(after):
+        return
+    unheard = {member for name, member in _causes(after, "inhibits") if name == UNHEARD}
     for group, one in (("errors", "error"), ("inhibits", "inhibit")):
         old, new = _causes(before, group), _causes(after, group)
         for cause in old:
-            if cause not in new:
+            if cause not in new and cause[1] not in unheard:
                 yield one, {**old[cause], "begins": False}, None
         for cause in new:
             if cause not in old:
                 yield one, {**new[cause], "begins": True}, None
+
+
+def _is_connected(line: Mapping[str, Any]) -> bool:
+    return bool(_member(line, "link", "state") == "CONNECTED")
 
 
 def _member(line: Mapping[str, Any], group: str, name: str) -> Any:
@@ -208,8 +258,15 @@ def _member(line: Mapping[str, Any], group: str, name: str) -> Any:
     return members.get(name) if isinstance(members, dict) else None
 
 
-def _causes(line: Mapping[str, Any], group: str) -> dict[str, dict[str, Any]]:
+def _causes(line: Mapping[str, Any], group: str) -> dict[tuple[str, str], dict[str, Any]]:
+    """The causes by name and, in a group, by the member that reports them."""
     causes = line.get(group)
     if not isinstance(causes, list):
         return {}
-    return {str(c.get("name")): {"name": c.get("name"), "text": c.get("text")} for c in causes if isinstance(c, dict)}
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for cause in causes:  # of several with one name the first text is shown
+        if isinstance(cause, dict):
+            member = {"handle": cause["handle"]} if "handle" in cause else {}
+            shown = {"name": cause.get("name"), "text": cause.get("text"), **member}
+            found.setdefault((str(cause.get("name")), str(cause.get("handle"))), shown)
+    return found

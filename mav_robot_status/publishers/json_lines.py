@@ -33,13 +33,13 @@ def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
     The text ends after link.state, so that `native` can append heartbeat_age. The encoder of `json` is slow. It runs
     for new parts only, which keeps the delay of a changed line short.
     """
-    errors = [{"code": e.code, "name": e.name, "text": e.text, "since": rfc3339(e.since_us)} for e in detail.errors]
-    inhibits = [{"name": i.name, "text": i.text, "since": rfc3339(i.since_us)} for i in detail.inhibits]
+    errors = [error.members() for error in detail.errors]
+    inhibits = [inhibit.members() for inhibit in detail.inhibits]
     body = (
         f"{_who(handle, detail.system, detail.component)}, {_fields(status)}, "
         f'"errors": {json.dumps(errors) if errors else "[]"}, '
         f'"inhibits": {json.dumps(inhibits) if inhibits else "[]"}, '
-        f'"vehicle": {_vehicle(detail.vehicle)}, "link": {{"state": "{detail.link.value}"'
+        f'"vehicle": {_vehicle(detail.vehicle)}, {_group(detail.members)}"link": {{"state": "{detail.link.value}"'
     )
     return body.replace("\x7f", r"\u007f")  # the one control character that JSON does not escape
 
@@ -62,6 +62,11 @@ def _vehicle(vehicle: Vehicle) -> str:
     return json.dumps(vehicle.members())
 
 
+@lru_cache(maxsize=256)
+def _group(members: tuple[str, ...]) -> str:
+    return f'"members": {json.dumps(members)}, ' if members else ""
+
+
 def native(msg: RobotStatusMsg, seq: int, body: str) -> str:
     """The native line."""
     age = "null" if msg.heartbeat_age is None else f"{max(0.0, msg.heartbeat_age):.3f}"
@@ -79,8 +84,13 @@ def ros2(msg: RobotStatusMsg, seq: int) -> str:
     """industrial_msgs/RobotStatus of ROS 2: every active error code, none while there is no error."""
     seconds, us = divmod(msg.unix_us, 1_000_000)
     header = {"stamp": {"sec": seconds, "nanosec": us * 1000}, "frame_id": msg.handle}
-    codes = [e.code for e in msg.detail.errors] or ([msg.status.error_code] if msg.status.error_code else [])
+    codes = error_codes(msg.status, msg.detail)
     return json.dumps({"header": header, **_ros_fields(msg.status, "ros2", codes)}) + "\n"
+
+
+def error_codes(status: RobotStatus, detail: Detail) -> list[int]:
+    """`error_codes` of ROS 2: every active code, the most important first."""
+    return [e.code for e in detail.errors] or ([status.error_code] if status.error_code else [])
 
 
 def _ros_fields(

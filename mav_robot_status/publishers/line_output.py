@@ -54,6 +54,10 @@ class LineOutput:
         self._tell_at = self._look_at = -math.inf
         self._retry_at = math.inf
         self._poll = select.poll()
+        self._is_ready = False
+        """Whether the output was just seen to be writable, so that `write` need not look."""
+        self._is_file = False
+        """A file is always writable."""
         self._fd = -1
         descriptor = stdout.fileno() if self._path is None else -1
         try:
@@ -70,8 +74,10 @@ class LineOutput:
         """True while an earlier line is written in part, or the pipe is full. An output that has failed takes lines."""
         if self._failure is not None:
             return False
-        full = bool(self._rest) or bool(self._held) or not self._is_writable()
-        return full and self._failure is None
+        if self._rest or self._held:
+            return True
+        self._is_ready = self._is_writable()
+        return not self._is_ready and self._failure is None
 
     def write(self, robot: str, line: bytes) -> None:
         """Write a line about a robot. Only called while not busy."""
@@ -82,6 +88,8 @@ class LineOutput:
 
     def service(self, now: Instant) -> float | None:
         """Write what waits. Check whether an idle reader has closed its end. Returns when to be called again."""
+        if now.mono < self._look_at and not (self._rest or self._held or self._failure or self._told):
+            return None  # called in every turn, and hardly ever with work
         if self._failure is not None:
             if now.mono >= self._retry_at:
                 self._try_again()
@@ -114,6 +122,7 @@ class LineOutput:
             descriptor = os.open(self._path, FLAGS, MODE)
             self._before = b"\n" if _ends_within_a_line(self._path, descriptor) else b""
         self._fd = descriptor
+        self._is_file = S_ISREG(os.fstat(descriptor).st_mode)
         self._poll.register(descriptor, select.POLLOUT)
 
     def _close(self) -> None:
@@ -123,6 +132,8 @@ class LineOutput:
             self._fd = -1
 
     def _is_writable(self) -> bool:
+        if self._is_file:
+            return True
         events = self._poll.poll(0)
         if not events:
             return False
@@ -140,7 +151,9 @@ class LineOutput:
 
     def _write(self) -> None:
         """Write while the pipe has room, at most PIPE_BUF bytes at once, so that no write blocks."""
-        while self._rest and self._is_writable():
+        ready, self._is_ready = self._is_ready, False
+        while self._rest and (ready or self._is_writable()):
+            ready = False
             try:
                 done = os.write(self._fd, self._rest[:PIPE_BUF])
             except BlockingIOError:

@@ -7,15 +7,16 @@ our names and those of the configuration, never an autopilot's texts: these woul
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from ..interface import FIELDS, Kind, LinkState
+from ..values import NamedTuple
 from ..version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-    from ..interface import ConnectionMetrics, Metrics, PublisherMetrics, RobotStatusMsg
+    from ..interface import ConnectionMetrics, ErrorCause, Inhibit, Metrics, PublisherMetrics, RobotStatusMsg
 
     Labels = dict[str, object]
 
@@ -45,6 +46,22 @@ def _age(msg: RobotStatusMsg) -> float | None:
     return None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
 
 
+def _can_arm(msg: RobotStatusMsg) -> float | None:
+    passes = msg.detail.vehicle.can_arm
+    return None if passes is None else int(passes)
+
+
+def _member(cause: ErrorCause | Inhibit) -> Labels:
+    """The label that names the member of a group; a single robot has none."""
+    return {} if cause.handle is None else {"member": cause.handle}
+
+
+def _reasons(msg: RobotStatusMsg) -> Iterable[tuple[Labels, float]]:
+    """One series for each name, and for each member of a group that gives it, however many texts it has."""
+    for name, handle in dict.fromkeys((inhibit.name, inhibit.handle) for inhibit in msg.detail.inhibits):
+        yield {"reason": name, **({} if handle is None else {"member": handle})}, 1
+
+
 def _info(msg: RobotStatusMsg) -> Iterable[tuple[Labels, float]]:
     vehicle = msg.detail.vehicle
     if vehicle.autopilot is not None:
@@ -63,14 +80,18 @@ VEHICLE: Final = (
         "error",
         GAUGE,
         "1 for each active cause of in_error.",
-        lambda m: (({"code": e.code, "cause": e.name}, 1) for e in m.detail.errors),
+        lambda m: (({"code": e.code, "cause": e.name, **_member(e)}, 1) for e in m.detail.errors),
     ),
     Family(
         "inhibit",
         GAUGE,
         "1 for each reason why motion is not possible.",
-        lambda m: (({"reason": i.name}, 1) for i in m.detail.inhibits),
+        _reasons,
     ),
+    Family(
+        "group_member", GAUGE, "1 for each member of a group.", lambda m: (({"member": n}, 1) for n in m.detail.members)
+    ),
+    Family("can_arm", GAUGE, "1 if the arming checks pass in the current mode, 0 if not; absent if unknown.", _can_arm),
     Family("vehicle_info", GAUGE, "1, with the autopilot's description of itself.", _info),
 )
 CONNECTION: Final = (
@@ -91,7 +112,9 @@ CONNECTION: Final = (
         "Frames with an unknown incompatibility flag.",
         lambda c: c.incompatible,
     ),
-    Family("connection_garbage_bytes_total", COUNTER, "Bytes received that are no MAVLink.", lambda c: c.garbage_bytes),
+    Family(
+        "connection_garbage_bytes_total", COUNTER, "Bytes received that are not MAVLink.", lambda c: c.garbage_bytes
+    ),
     Family(
         "connection_dropped_total",
         COUNTER,

@@ -1,4 +1,8 @@
-"""Statuses as NAMED_VALUE_INT and STATUSTEXT, for ground stations without ROBOT_STATUS."""
+"""Statuses as NAMED_VALUE_INT and STATUSTEXT, for ground stations without ROBOT_STATUS.
+
+These messages carry the system id of a vehicle and nothing else that names it. A group has the system id of its vehicle
+and is left out: a ground station would take the emergency stop of an arm for that of the vehicle, which may be live.
+"""
 
 from __future__ import annotations
 
@@ -63,6 +67,11 @@ class NamedValuePublisher(RateLimitedPublisher[_Sent]):
     def wants(self, audience: Audience) -> bool:
         """True for an audience of ground stations."""
         return audience.mirror
+
+    def publish(self, msg: RobotStatusMsg) -> None:
+        """Hold the message of a vehicle until `service`."""
+        if not msg.detail.members:
+            super().publish(msg)
 
     def send_due(self, msg: RobotStatusMsg, system: int, audience: Audience, sent: _Sent, now: float) -> float:
         """Send the values and the text if they are due; return when the next one will be due, or inf."""

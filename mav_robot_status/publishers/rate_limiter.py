@@ -11,7 +11,7 @@ from ..interface import LinkState
 from ..interface.options import Options
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
+    from collections.abc import Hashable, Sequence
 
     from ..clock import Instant
     from ..interface import Audience, PublisherContext, RobotStatusMsg
@@ -63,11 +63,10 @@ class Schedule:
 class RateLimitedPublisher(ABC, Generic[S]):
     """Holds the last message of each handle, and a state `S` for each handle and audience.
 
-    A new audience gets the last message of each handle at once. The state of a gone audience is deleted. Nothing is
-    sent about a vehicle before its first heartbeat.
+    A new audience gets the last message of each handle at once, after a time without any with the next turn. The state
+    of a gone audience is deleted. Nothing is sent about a vehicle before its first heartbeat.
     """
 
-    periodic = True
     live_only = True
     name: ClassVar[str]
     state_type: ClassVar[type]
@@ -79,6 +78,10 @@ class RateLimitedPublisher(ABC, Generic[S]):
         """Raises UsageError for an option: there are none."""
         Options.read(self.name, context.options)
         self._port = context.mavlink
+        self.periodic = True
+        """False while there is no audience: then periodic messages would only wake the process."""
+        self._offered: Sequence[Audience] | None = None
+        """The audiences of the port when they were last seen."""
         self._audiences: list[Audience] = []
         self._states: dict[Hashable, dict[str, S]] = {}
         self._latest: dict[str, RobotStatusMsg] = {}
@@ -108,15 +111,22 @@ class RateLimitedPublisher(ABC, Generic[S]):
             self._latest.pop(msg.handle, None)
             return
         self._latest[msg.handle] = msg
-        self._waiting[msg.handle] = None
+        if self._audiences:
+            self._waiting[msg.handle] = None
 
     def service(self, now: Instant) -> float | None:
         """Send due messages; return when a delayed change will be due."""
-        audiences = [audience for audience in self._port.audiences() if self.wants(audience)]
-        if audiences != self._audiences:
-            self._audiences = audiences
-            self._states = {a.key: self._states.get(a.key, {}) for a in audiences}
-            self._waiting = dict.fromkeys(self._latest)
+        offered = self._port.audiences()
+        if offered is not self._offered:
+            self._offered = offered
+            self._serve([audience for audience in offered if self.wants(audience)])
+            if self._audiences and not self.periodic:
+                self.periodic = True
+                if self._waiting:  # held since the last change: the pipeline first has them published again
+                    return now.mono
+            self.periodic = bool(self._audiences)
+        if not self._waiting:
+            return None
         again, waiting, self._waiting = math.inf, self._waiting, {}
         for handle in waiting:
             due = self._send_to_all(handle, now.mono)
@@ -133,6 +143,13 @@ class RateLimitedPublisher(ABC, Generic[S]):
 
     def close(self) -> None:
         """Nothing to release."""
+
+    def _serve(self, audiences: list[Audience]) -> None:
+        """Send to these from now on."""
+        if audiences != self._audiences:
+            self._audiences = audiences
+            self._states = {a.key: self._states.get(a.key, {}) for a in audiences}
+            self._waiting = dict.fromkeys(self._latest) if audiences else {}
 
     def _send_to_all(self, handle: str, now: float) -> float:
         """Send the message of one handle to every audience; return when a delayed message will be due."""

@@ -14,7 +14,9 @@ Scenarios are data: `scenarios` has ready ones; build others with `step` and `Sc
 """
 
 from .codec import decode
+from .event_table import VehicleFiles, event_files
 from .fake_autopilot import FakeAutopilot
+from .lossy import Lossy
 from .manual_clock import ManualClock
 from .scenario import Action, Scenario, Step, Text, VehicleState, step, with_applet
 from .scenarios import (
@@ -39,10 +41,12 @@ __all__ = [
     "DEMO",
     "Action",
     "FakeAutopilot",
+    "Lossy",
     "ManualClock",
     "Scenario",
     "Step",
     "Text",
+    "VehicleFiles",
     "VehicleState",
     "arduboat",
     "arducopter",
@@ -52,6 +56,7 @@ __all__ = [
     "betaflight",
     "blimp",
     "decode",
+    "event_files",
     "inav",
     "px4",
     "px4_vtol",

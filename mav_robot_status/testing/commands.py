@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from .codec import DecodedMessage
-from .definitions import CommandAck, MessageInterval, ParamValue
+from .definitions import CommandAck, FileTransferProtocol, MessageInterval, ParamValue
 from .firmware import (
     ACCEPTED,
     ARDUPILOT,
@@ -16,11 +16,12 @@ from .firmware import (
     LANDING,
     PX4,
     TAKEOFF,
+    TEMPORARILY_REJECTED,
     UNSUPPORTED,
     not_armable,
     px4_mode,
 )
-from .messages import BUILDERS, autopilot_version, available_modes, can_send
+from .messages import BUILDERS, autopilot_version, available_modes, can_send, component_metadata
 from .scenario import Text, step
 from .vehicle_model import VehicleModel
 
@@ -28,11 +29,11 @@ CUSTOM_MODE_ENABLED = 1
 FORCED = 21196
 GCS = 6
 GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
-ARM_DISARM, DO_SET_MODE, SET_MODE, DO_AUX_FUNCTION = 400, 176, 11, 218
+ARM_DISARM, DO_SET_MODE, SET_MODE, DO_AUX_FUNCTION, RUN_PREARM_CHECKS = 400, 176, 11, 218, 401
 MOTOR_ESTOP = 31
 """The auxiliary function of ArduPilot that stops all motors."""
 LOW, HIGH = 0, 2
-AUTOPILOT_VERSION, AVAILABLE_MODES = 148, 435
+AUTOPILOT_VERSION, AVAILABLE_MODES, COMPONENT_METADATA = 148, 435, 397
 STREAM_GROUPS = {2: (1,), 3: (36,), 6: (33, 32), 10: (30,), 11: (74,), 12: (2,)}
 """ArduPilot's stream groups: the message ids that REQUEST_DATA_STREAM starts. Group 0 means all groups."""
 INT16 = 4
@@ -90,6 +91,9 @@ def _request_message(model: VehicleModel, m: DecodedMessage) -> int:
     if m.param1 == AUTOPILOT_VERSION and model.firmware.version:
         model.send(autopilot_version(model.firmware))
         return ACCEPTED
+    if m.param1 == COMPONENT_METADATA and model.files is not None:
+        model.send(component_metadata(model.snapshot(), model.files))
+        return ACCEPTED
     if not can_send(model.firmware, m.param1):
         return UNSUPPORTED
     model.send(BUILDERS[int(m.param1)](model.snapshot()))
@@ -99,11 +103,23 @@ def _request_message(model: VehicleModel, m: DecodedMessage) -> int:
 def _arm_disarm(model: VehicleModel, m: DecodedMessage) -> int:
     arm, forced, state = m.param1 == 1, m.param2 == FORCED, model.state
     if arm and not_armable(state) and not forced:
-        model.say(Text(2, model.firmware.arming_refused.format(not_armable(state))))
+        refusal = model.firmware.arming_refused
+        for text in dict.fromkeys(refusal.format(reason) for reason in not_armable(state)):
+            model.say(Text(2, text))
         return model.firmware.refused
     if not arm and state.armed and state.landed_state in (IN_AIR, TAKEOFF, LANDING) and not forced:
         return model.firmware.refused
     model.do(step(0.0, "", armed=arm))
+    return ACCEPTED
+
+
+def _run_prearm_checks(model: VehicleModel, m: DecodedMessage) -> int:
+    """Only ArduPilot announces the reasons in texts. The periodic announcement keeps its period, as in the firmware."""
+    if not model.firmware.prearm_prefix:
+        return UNSUPPORTED
+    if model.state.armed:
+        return TEMPORARILY_REJECTED
+    model.say_prearm()
     return ACCEPTED
 
 
@@ -155,11 +171,19 @@ def _param_request_read(model: VehicleModel, m: DecodedMessage) -> None:
         model.send(ParamValue(value, len(names), m.param_index & 0xFFFF, name.encode(), INT16))
 
 
+def _file_transfer(model: VehicleModel, m: DecodedMessage) -> None:
+    client = m.get_srcSystem(), m.get_srcComponent()
+    if model.file_server is not None:
+        for payload in model.file_server.answer(m.payload, model.now):
+            model.send(FileTransferProtocol(0, *client, payload))
+
+
 COMMANDS: dict[int, Callable[[VehicleModel, DecodedMessage], int]] = {
     GET_MESSAGE_INTERVAL: _get_message_interval,
     SET_MESSAGE_INTERVAL: _set_message_interval,
     REQUEST_MESSAGE: _request_message,
     ARM_DISARM: _arm_disarm,
+    RUN_PREARM_CHECKS: _run_prearm_checks,
     DO_AUX_FUNCTION: _do_aux_function,
     DO_SET_MODE: _do_set_mode,
 }
@@ -169,4 +193,5 @@ ANSWERS: dict[str, Callable[[VehicleModel, DecodedMessage], None]] = {
     "SET_MODE": _set_mode,
     "REQUEST_DATA_STREAM": _request_data_stream,
     "PARAM_REQUEST_READ": _param_request_read,
+    "FILE_TRANSFER_PROTOCOL": _file_transfer,
 }

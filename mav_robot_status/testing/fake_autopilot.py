@@ -17,6 +17,8 @@ from ..clock import Instant
 from ..mavlink.signing import Signer
 from .codec import DecodedMessage, decode
 from .commands import answer
+from .event_table import VehicleFiles
+from .lossy import Lossy, LossyLink
 from .scenario import Action, Scenario, Step, Text, VehicleState, step
 from .vehicle_model import Outgoing, VehicleModel
 
@@ -43,7 +45,8 @@ class FakeAutopilot:
     or let a thread run on the real clock: `with FakeAutopilot(scenario, to=...) as ap:`. The methods that change the
     vehicle (`arm`, `say`, ...) may be called from any thread; the next poll applies the change. `speed` makes the steps
     of the scenario pass faster, `loop` restarts it at its end. `on_note` is called with each step, in the thread
-    if one runs; the default logs the step. With a `signing_key` of 32 bytes it signs its frames.
+    if one runs; the default logs the step. With a `signing_key` of 32 bytes it signs its frames. With `files` it offers
+    its metadata and serves them over MAVLink FTP. With `lossy` its link is bad in both directions.
 
     Raises OSError if the address `bind` is in use.
     """
@@ -60,6 +63,8 @@ class FakeAutopilot:
         on_note: Callable[[Step], None] = _log_note,
         bind: Address = ("127.0.0.1", 0),
         signing_key: bytes | None = None,
+        files: VehicleFiles | None = None,
+        lossy: Lossy | None = None,
     ) -> None:
         self.scenario = scenario
         self._model: VehicleModel | None = None
@@ -68,6 +73,9 @@ class FakeAutopilot:
         self._answers_sender = to is None
         self._ids = system, component
         self._signer = None if signing_key is None else Signer(signing_key, link_id=0)
+        self._files = files
+        self._sent: LossyLink[bytes] = LossyLink(lossy or Lossy())
+        self._arrived: LossyLink[tuple[bytes, Address]] = LossyLink((lossy or Lossy())._replace(seed=1))
         self._pending: deque[Step] = deque()
         self._received: deque[DecodedMessage] = deque(maxlen=RECEIVED_KEPT)
         self._lock = threading.Lock()
@@ -148,13 +156,15 @@ class FakeAutopilot:
         """Receive the datagrams that wait, and send the messages that are due. The first call starts the scenario."""
         if self._model is None:
             self._model = VehicleModel(self.scenario, now.mono, self._speed, self._loop, self._on_note)
+            self._model.serve(self._files)
         due = self._model.run(now)
         while self._pending:
             self._model.do(self._pending.popleft())
-        for data, sender in self._receive():
+        for data, sender in self._arrived.carry(self._receive()):
             self._handle(self._model, decode(data), sender)
-        for outgoing in due + self._model.run(now):
-            self._send(outgoing, now.unix_us)
+        frames = [self._frame(outgoing, now.unix_us) for outgoing in due + self._model.run(now)]
+        for frame in self._sent.carry(frames):
+            self._send(frame)
 
     def close(self) -> None:
         """Stop the thread, if any, and close the socket."""
@@ -196,12 +206,13 @@ class FakeAutopilot:
                     self._received.append(message)
                 answer(model, message)
 
-    def _send(self, outgoing: Outgoing, unix_us: int) -> None:
+    def _frame(self, outgoing: Outgoing, unix_us: int) -> bytes:
+        frame = outgoing.frame(*self._ids)
+        return frame if self._signer is None else self._signer.sign(frame, unix_us)
+
+    def _send(self, frame: bytes) -> None:
         if self._to is None:
             return
-        frame = outgoing.frame(*self._ids)
-        if self._signer is not None:
-            frame = self._signer.sign(frame, unix_us)
         with contextlib.suppress(OSError):  # as on a real link, a datagram that cannot be sent is lost
             self._socket.sendto(frame, self._to)
 

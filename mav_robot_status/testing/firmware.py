@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+
+from mav_robot_status.values import NamedTuple
 
 from .scenario import MOTOR_OUTPUTS, PREARM_CHECK, Step, VehicleState
 
@@ -88,11 +89,14 @@ def sensors(firmware: Firmware, state: VehicleState, prearm_ok: bool) -> tuple[i
     return present, enabled, state.sensors_health & ~PREARM_CHECK | (PREARM_CHECK if healthy and reported else 0)
 
 
-def not_armable(state: VehicleState) -> str:
+def not_armable(state: VehicleState) -> tuple[str, ...]:
     """Why the vehicle cannot be armed; empty if it can."""
     if state.emergency_stop:
-        return "Motors Emergency Stopped"
-    return "Hardware safety switch" if state.safety_switch else state.prearm
+        return ("Motors Emergency Stopped",)
+    if state.safety_switch:
+        return ("Hardware safety switch",)
+    reasons = (state.prearm,) if isinstance(state.prearm, str) else state.prearm
+    return tuple(reason for reason in reasons if reason)
 
 
 def px4_mode(main: int, sub: int = 0) -> int:

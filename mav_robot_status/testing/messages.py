@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+
+from mav_robot_status.values import NamedTuple
 
 from .definitions import (
     Attitude,
     AutopilotVersion,
     AvailableModes,
+    ComponentMetadata,
     CurrentMode,
     EkfStatusReport,
     ExtendedSysState,
     GlobalPositionInt,
     Heartbeat,
+    HighLatency2,
     LocalPositionNed,
     NamedValueFloat,
     ServoOutputRaw,
@@ -23,10 +26,11 @@ from .definitions import (
     SystemTime,
     VfrHud,
 )
+from .event_table import VehicleFiles
 from .firmware import ARDUPILOT, PX4, Firmware, base_mode, sensors, system_status
 from .scenario import Text, VehicleState
 
-HEARTBEAT, SYS_STATUS = 0, 1
+HEARTBEAT, SYS_STATUS, HIGH_LATENCY2 = 0, 1, 235
 HOME = (-353632610, 1491652300, 584000)
 """Latitude and longitude in 1e-7 degrees, altitude in mm. They never change: a status does not depend on them."""
 CHUNK = 50
@@ -128,6 +132,51 @@ def _ekf_status_report(s: Snapshot) -> NamedTuple:
     return EkfStatusReport(0.1, 0.1, 0.1, 0.1, 0.0, flags=flags, airspeed_variance=0.0)
 
 
+FAILURE_FLAGS = {5: 1, 4: 2, 3: 4, 1: 8, 0: 16, 2: 32, 22: 64, 25: 128, 16: 256, 20: 2048, 21: 4096}
+"""HL_FAILURE_FLAG by the bit of SYS_STATUS that is not healthy."""
+UNTOLD = -128
+
+
+def high_latency2(s: Snapshot) -> NamedTuple:
+    """HIGH_LATENCY2: ArduPilot tells base_mode and sets a flag for a sensor that it lacks; PX4 does neither."""
+    f, state = s.firmware, s.state
+    north, east, down = state.velocity
+    lat, lon, alt = HOME if state.position else (0, 0, 0)
+    is_px4 = f.autopilot == PX4
+    _, enabled, health = sensors(f, state, s.prearm_ok)
+    faulty = ~health & (enabled if is_px4 else -1)
+    armed = base_mode(f, state)
+    return HighLatency2(
+        timestamp=s.boot_ms,
+        latitude=lat,
+        longitude=lon,
+        custom_mode=state.custom_mode >> 16 if is_px4 else state.custom_mode,
+        altitude=alt // 1000,
+        target_altitude=alt // 1000,
+        target_distance=0,
+        wp_num=0xFFFF if is_px4 else 0,
+        failure_flags=sum(flag for bit, flag in FAILURE_FLAGS.items() if faulty >> bit & 1),
+        type=f.type,
+        autopilot=f.autopilot,
+        heading=0,
+        target_heading=0,
+        throttle=state.throttle,
+        airspeed=0,
+        airspeed_sp=0,
+        groundspeed=min(round(math.hypot(north, east) * 5), 255),
+        windspeed=0,
+        wind_heading=0,
+        eph=10 if is_px4 else 0,
+        epv=15 if is_px4 else 0,
+        temperature_air=UNTOLD,
+        climb_rate=min(round(abs(down) * 10), 127) if is_px4 else 0,
+        battery=100,
+        custom0=UNTOLD if is_px4 else armed - 256 if armed > 127 else armed,
+        custom1=UNTOLD if is_px4 else 0,
+        custom2=UNTOLD if is_px4 else 0,
+    )
+
+
 def applet_value(state: VehicleState) -> int:
     """The value of RS_STOP: 1 for the emergency stop and 2 for the safety switch."""
     return state.emergency_stop + 2 * state.safety_switch
@@ -148,6 +197,7 @@ BUILDERS: dict[int, Callable[[Snapshot], NamedTuple]] = {
     36: _servo_outputs,
     74: _vfr_hud,
     193: _ekf_status_report,
+    HIGH_LATENCY2: high_latency2,
     245: _extended_sys_state,
     436: _current_mode,
 }
@@ -182,6 +232,11 @@ def available_modes(firmware: Firmware, index: int) -> list[NamedTuple]:
 def autopilot_version(firmware: Firmware) -> NamedTuple:
     """AUTOPILOT_VERSION."""
     return AutopilotVersion._make((0, 0, firmware.version, *(0,) * 5, *(b"",) * 4))
+
+
+def component_metadata(s: Snapshot, files: VehicleFiles) -> NamedTuple:
+    """COMPONENT_METADATA."""
+    return ComponentMetadata(s.boot_ms, files.crc, files.uri.encode())
 
 
 def statustexts(firmware: Firmware, text: Text, number: int) -> list[NamedTuple]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
+
+from mav_robot_status.values import NamedTuple
 
 if TYPE_CHECKING:
     from .firmware import Firmware
@@ -14,6 +16,7 @@ MOTOR_OUTPUTS = 1 << 15
 RC_RECEIVER = 1 << 16
 AHRS = 1 << 21
 GPS = 1 << 5
+HIGH_LATENCY2 = 235
 
 
 class VehicleState(NamedTuple):
@@ -21,8 +24,8 @@ class VehicleState(NamedTuple):
 
     custom_mode: int = 0
     armed: bool = False
-    prearm: str = ""
-    """Why the vehicle cannot be armed: the firmware's text without prefix; empty if it can."""
+    prearm: str | tuple[str, ...] = ""
+    """Why the vehicle cannot be armed: the firmware's text without prefix, or several texts; empty if it can."""
     failsafe: bool = False
     """Any failsafe is active: HEARTBEAT.system_status becomes CRITICAL."""
     emergency_stop: bool = False
@@ -101,6 +104,8 @@ class Scenario(NamedTuple):
     """Message id to Hz: the streams that run without a request; None: the defaults of the firmware."""
     streams_after: float = 0.0
     """Seconds from the first heartbeat of a boot until these streams begin."""
+    satellite: bool = False
+    """The link is one for high latency: no HEARTBEAT, no texts, and HIGH_LATENCY2 among the streams."""
     repeats: float | None = None
     """Seconds after which the link sends each message once more; None: never."""
 
@@ -124,6 +129,19 @@ def with_applet(scenario: Scenario) -> Scenario:
     return scenario._replace(title=f"with the applet: {scenario.title}", start=scenario.start._replace(applet=True))
 
 
+def by_satellite(scenario: Scenario, hz: float) -> Scenario:
+    """The same scenario of a vehicle that sends HIGH_LATENCY2 at this rate and nothing else."""
+    streams = {HIGH_LATENCY2: hz}
+    return scenario._replace(title=f"by satellite: {scenario.title}", streams=streams, satellite=True)
+
+
 def shifted(seconds: float, steps: tuple[Step, ...]) -> tuple[Step, ...]:
     """The same steps, `seconds` later."""
     return tuple(s._replace(at=s.at + seconds) for s in steps)
+
+
+def ending(scenario: Scenario, rest: float = 5.0) -> Scenario:
+    """The same scenario with an end, `rest` seconds after its last step, so that it can be played in a loop."""
+    if not scenario.steps or any(one.action is Action.END for one in scenario.steps):
+        return scenario
+    return scenario._replace(steps=(*scenario.steps, step(scenario.duration + rest, "the end", action=Action.END)))

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
 
 from ..clock import Instant
+from ..values import NamedTuple
 from .codec import encode
+from .event_table import VehicleFiles
+from .file_server import FileServer
 from .firmware import ARDUPILOT, PX4, not_armable
-from .messages import BUILDERS, HEARTBEAT, SYS_STATUS, Snapshot, applet_report, applet_value, heartbeat, statustexts
+from .messages import (
+    BUILDERS,
+    HEARTBEAT,
+    HIGH_LATENCY2,
+    SYS_STATUS,
+    Snapshot,
+    applet_report,
+    applet_value,
+    heartbeat,
+    statustexts,
+)
 from .scenario import Action, Scenario, Step, Text
 
 REBOOT_GAP = 1.2
@@ -66,7 +78,16 @@ class VehicleModel:
         self._now = start
         self._unix_us = 0
         self._schedule: list[tuple[float, Step]] = []
+        self.files: VehicleFiles | None = None
         self._power_on(start)
+
+    def serve(self, files: VehicleFiles | None) -> None:
+        """Offer these files, with the metadata that names them; None: none."""
+        self.files = files
+        self._restart_server()
+
+    def _restart_server(self) -> None:
+        self.file_server = None if self.files is None else FileServer(self.files.files)
 
     def _power_on(self, at: float) -> None:
         self.state = self.scenario.start
@@ -78,6 +99,7 @@ class VehicleModel:
     def _boot(self, at: float) -> None:
         """Reset what a reboot resets."""
         self.boot = at
+        self._restart_server()
         self._seq = 0
         self._texts = 0
         self.peer_seen = self.gcs_seen = False
@@ -88,11 +110,20 @@ class VehicleModel:
         self._due = {message: at + interval for message, interval in self._intervals.items()}
         for message in self.default_streams:
             self._due[message] += self.scenario.streams_after
-        self._due[HEARTBEAT] = at
+        if self.scenario.satellite:
+            del self._intervals[HEARTBEAT], self._due[HEARTBEAT]
+            self._due[HIGH_LATENCY2] = at
+        else:
+            self._due[HEARTBEAT] = at
 
     def _plan(self, start: float, steps: Iterable[Step]) -> None:
         self._schedule += [(start + step.at / self._speed, step) for step in steps]
         self._schedule.sort(key=lambda planned: planned[0])
+
+    @property
+    def now(self) -> float:
+        """The time of the last `run`."""
+        return self._now
 
     @property
     def default_streams(self) -> dict[int, float]:
@@ -145,13 +176,17 @@ class VehicleModel:
 
     def _check_prearm(self) -> None:
         """ArduPilot announces failing checks when they start to fail, and every 30 s after that."""
-        before, reason = self._prearm_ok, not_armable(self.state)
-        self._prearm_ok = self.state.armed or not reason
-        if self._prearm_ok or not self.firmware.prearm_prefix:
-            return
-        if before or self._now - self._prearm_said >= PREARM_REPEAT:
+        before = self._prearm_ok
+        self._prearm_ok = self.state.armed or not not_armable(self.state)
+        if not self._prearm_ok and (before or self._now - self._prearm_said >= PREARM_REPEAT):
             self._prearm_said = self._now
-            self.say(Text(2, self.firmware.prearm_prefix + reason))
+            self.say_prearm()
+
+    def say_prearm(self) -> None:
+        """Announce every reason why the vehicle cannot be armed, if the firmware does so."""
+        if self.firmware.prearm_prefix:
+            for reason in not_armable(self.state):
+                self.say(Text(2, self.firmware.prearm_prefix + reason))
 
     def _report_stop(self) -> None:
         """The applet reports to a peer, as texts do: at once on a change, and a second after its last report."""
@@ -182,7 +217,7 @@ class VehicleModel:
 
     def say(self, text: Text) -> None:
         """Send a STATUSTEXT: PX4 only to a ground station, others on an active link."""
-        if self.gcs_seen if self.firmware.autopilot == PX4 else self._heard:
+        if not self.scenario.satellite and (self.gcs_seen if self.firmware.autopilot == PX4 else self._heard):
             self._texts = self._texts % 0xFFFF + 1
             for message in statustexts(self.firmware, text, self._texts):
                 self.send(message)
@@ -193,7 +228,8 @@ class VehicleModel:
         if step.note:
             self._on_step(step)
         # ArduPilot reports a mode change at once, arming with the next regular HEARTBEAT; PX4 reports both with it.
-        if self.state.custom_mode != before.custom_mode and self.firmware.autopilot == ARDUPILOT:
+        at_once = self.firmware.autopilot == ARDUPILOT and not self.scenario.satellite
+        if self.state.custom_mode != before.custom_mode and at_once:
             self.send(heartbeat(self.snapshot()))
         if applet_value(self.state) != applet_value(before):
             self._report_stop()

@@ -11,12 +11,16 @@ import hashlib
 import html
 import json
 import os
+from collections import defaultdict
 from importlib.resources import files
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import rfc3339
 from ..errors import LinkError, UsageError
 from ..interface import STATES, Kind, LinkState, RobotMode
+from ..language import LOOKS, remedy, style_sheet
+from ..language.values import NO, UNKNOWN, YES
 from .timeline import TRACKS, Span
 from .totals import totals
 
@@ -24,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from .timeline import Reason, Timeline, VehicleTimeline
-    from .totals import ReasonTotal
+    from .totals import ReasonTotal, Totals
 
 WORDS: Final = {"TRUE": True, "FALSE": False, "UNKNOWN": None}
 """The JSON of a TriState."""
@@ -35,6 +39,10 @@ VALUES: Final[dict[str, tuple[str, ...]]] = {
     **{field.name: tuple(mode.name for mode in RobotMode) for field in STATES if field.kind is Kind.MODE},
 }
 """The values of each track. The totals list all of them, even those that never occurred."""
+LOOKS_OF: Final = {**LOOKS, "armed": {True: YES, False: NO, None: UNKNOWN}}
+"""The looks of each track. A flight mode has its own name."""
+UNCERTAIN: Final = ("LINK_STALE", "SYS_STATUS_MISSING", "STOP_UNCERTAIN", "SENDER_UNCERTAIN")
+"""The inhibits that say why something is unknown, not why motion is not possible."""
 ESCAPES: Final = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&"})
 """Characters that could open or close an element; in JSON they occur in strings only."""
 
@@ -55,7 +63,12 @@ def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> dict[str, Any]:
         "handle": vehicle.handle,
         "system": vehicle.system,
         "component": vehicle.component,
-        "vehicle": {"autopilot": vehicle.autopilot, "type": vehicle.type},
+        "vehicle": {
+            "autopilot": vehicle.autopilot,
+            "type": vehicle.type,
+            **({} if vehicle.name is None else {"name": vehicle.name}),
+        },
+        **({"members": list(vehicle.members)} if vehicle.members else {}),
         "totals": {
             "seconds": _seconds(whole.watched),
             "arm_cycles": len(whole.arm_cycles),
@@ -93,7 +106,13 @@ def _span(timeline: Timeline, track: str, span: Span) -> dict[str, Any]:
 
 
 def _reason(timeline: Timeline, reason: Reason) -> dict[str, Any]:
-    return {"name": reason.name, "text": reason.text, **_interval(timeline, reason.start, reason.end)}
+    interval = _interval(timeline, reason.start, reason.end)
+    return {"name": reason.name, "text": reason.text, **_member(reason), **interval}
+
+
+def _member(reason: Reason | ReasonTotal) -> dict[str, str]:
+    """The member of a group that reports it; a single robot has none."""
+    return {} if reason.handle is None else {"handle": reason.handle}
 
 
 def _reason_total(total: ReasonTotal, code: bool = True) -> dict[str, Any]:
@@ -101,6 +120,7 @@ def _reason_total(total: ReasonTotal, code: bool = True) -> dict[str, Any]:
     return {
         **named,
         "name": total.name,
+        **_member(total),
         "count": total.occurrences,
         "seconds": _seconds(total.active),
         "texts": list(total.texts),
@@ -116,7 +136,7 @@ def _seconds(us: int) -> float:
 
 def as_html(timelines: Sequence[Timeline], made_by: str) -> str:
     """The page."""
-    script, style = _asset("report.js"), _asset("report.css")
+    script, style = _asset("report.js"), style_sheet() + _asset("report.css")
     policy = (
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; "
         "img-src data:; base-uri 'none'; form-action 'none'"
@@ -126,13 +146,27 @@ def as_html(timelines: Sequence[Timeline], made_by: str) -> str:
         "title": html.escape(", ".join(timeline.name for timeline in timelines)),
         "style": style,
         "script": script,
-        "data": embedded({"by": made_by, "logs": [_page_log(timeline) for timeline in timelines]}),
+        "data": embedded(
+            {"by": made_by, "looks": _looks(), "logs": [_page_log(timeline) for timeline in timelines]},
+        ),
     }
     page, *rest = _asset("report.html").split("{{")  # each part is inserted once and not scanned again
     for piece in rest:
         name, _, following = piece.partition("}}")
         page += parts[name] + following
     return page
+
+
+def _looks() -> dict[str, dict[str, dict[str, str]]]:
+    """How each value of each track looks, by the word of the timeline for it."""
+    names = {value: name for name, value in WORDS.items()}
+    return {
+        track: {
+            names.get(value, value): {"word": one.word, "glyph": one.glyph, "tone": one.tone, "bar": one.bar}
+            for value, one in looks.items()
+        }
+        for track, looks in LOOKS_OF.items()
+    }
 
 
 def save(page: str, path: str) -> None:
@@ -159,20 +193,50 @@ def _page_log(timeline: Timeline) -> dict[str, Any]:
 
 
 def _page_vehicle(vehicle: VehicleTimeline, strings: _Numbered) -> dict[str, Any]:
-    by_name: dict[str, dict[str, list[Span | Reason]]] = {"errors": {}, "inhibits": {}}
+    by_name: dict[str, dict[str, Sequence[Reason]]] = {"errors": {}, "inhibits": {}}
     for kind, found in by_name.items():
-        for reason in getattr(vehicle, kind):
-            found.setdefault(reason.name, []).append(reason)
+        for title, reasons in _by_title(getattr(vehicle, kind)).items():
+            found[title] = _in_a_row(reasons)
     whole = totals(vehicle)
     return {
-        "name": f"{vehicle.system}.{vehicle.component}",
-        "handle": vehicle.handle,
+        "name": _title(vehicle),
+        "handle": ", ".join(vehicle.members) or vehicle.handle,
         "autopilot": vehicle.autopilot,
         "type": vehicle.type,
         "tracks": {name: _packed(spans, strings) for name, spans in vehicle.tracks.items()},
         **{kind: {name: _packed(r, strings) for name, r in found.items()} for kind, found in by_name.items()},
-        "totals": whole._asdict() | {name: [t._asdict() for t in getattr(whole, name)] for name in _LISTS},
+        "totals": whole._asdict() | _lists(whole),
     }
+
+
+def _title(vehicle: VehicleTimeline) -> str:
+    """`1.1`, or `1.1 Rover-A` if it has a name; the handle of a group."""
+    if vehicle.members:
+        return vehicle.handle
+    ids = f"{vehicle.system}.{vehicle.component}"
+    return ids if vehicle.name is None else f"{ids} {vehicle.name}"
+
+
+def _by_title(reasons: Iterable[Reason]) -> dict[str, list[Reason]]:
+    found: dict[str, list[Reason]] = {}
+    for reason in reasons:
+        found.setdefault(reason.title, []).append(reason)
+    return found
+
+
+def _in_a_row(reasons: list[Reason]) -> list[Reason]:
+    """Reasons of one title without overlaps, for one row of the page: texts at the same time are joined."""
+    begin: dict[int, list[Reason]] = defaultdict(list)
+    for reason in reasons:
+        begin[reason.start].append(reason)
+    row: list[Reason] = []
+    active: list[Reason] = []
+    for start, end in pairwise(sorted({edge for reason in reasons for edge in (reason.start, reason.end)})):
+        active = [reason for reason in active if reason.end > start] + begin.get(start, [])
+        if active:
+            text = "; ".join(reason.text for reason in active if reason.text is not None) or None
+            row.append(active[0]._replace(start=start, end=end, text=text))
+    return row
 
 
 def _packed(spans: Sequence[Span | Reason], strings: _Numbered) -> list[int]:
@@ -194,7 +258,27 @@ class _Numbered(dict[Any, int]):
         return self[text]
 
 
-_LISTS: Final = ("arm_cycles", "errors", "inhibits")
+def _lists(whole: Totals) -> dict[str, list[dict[str, Any]]]:
+    """The lists among the totals."""
+    return {
+        "arm_cycles": [cycle._asdict() for cycle in whole.arm_cycles],
+        "errors": [{**_total(t), "kind": "error", "tone": "alarm"} for t in whole.errors],
+        "inhibits": [_inhibit(t) for t in whole.inhibits],
+    }
+
+
+def _total(total: ReasonTotal) -> dict[str, Any]:
+    """A reason with its words, and the steps for its texts."""
+    rows = [remedy({"name": total.name, "text": text}) for text in total.texts or (None,)]
+    steps = list(dict.fromkeys(row.step for row in rows if row.step))
+    return {**total._asdict(), "name": total.title, "sentence": rows[0].sentence, "steps": steps}
+
+
+def _inhibit(total: ReasonTotal) -> dict[str, Any]:
+    if total.name in UNCERTAIN:
+        return {**_total(total), "kind": "unknown", "tone": "unknown"}
+    tone = "warning" if remedy({"name": total.name}).person else "calm"
+    return {**_total(total), "kind": "inhibit", "tone": tone}
 
 
 def _asset(name: str) -> str:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import bisect
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ..interface import STATES, LinkState, TriState
+from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -45,6 +46,13 @@ class Reason(NamedTuple):
     code: int | None
     """The number of an error cause; None for an inhibit."""
     text: str | None
+    handle: str | None = None
+    """The member of a group that reports it; None for a single robot."""
+
+    @property
+    def title(self) -> str:
+        """Its name; in a group with the member in front: `arm: E_STOPPED`."""
+        return self.name if self.handle is None else f"{self.handle}: {self.name}"
 
 
 class Segment(NamedTuple):
@@ -69,7 +77,11 @@ class VehicleTimeline:
     """In order of time, without overlaps. There is a gap before the first heartbeat."""
     errors: list[Reason] = field(default_factory=list)
     inhibits: list[Reason] = field(default_factory=list)
-    """In order of their ends. Intervals of the same name do not overlap."""
+    """In order of their ends. Those of the same title and text do not overlap; an inhibit may have several texts."""
+    members: tuple[str, ...] = ()
+    """The handles of a group. Empty for a single robot."""
+    name: str | None = None
+    """What people call it."""
 
 
 @dataclass
@@ -129,6 +141,10 @@ class TimelineBuilder:
         return round((now.mono - self._origin) * 1e6)
 
 
+_Named = tuple[str, "str | None"]
+"""A reason by its name and text."""
+
+
 class _Recorder:
     """The open intervals of one vehicle."""
 
@@ -136,8 +152,8 @@ class _Recorder:
         self.vehicle = vehicle
         self._seen: tuple[RobotStatus, Detail] | None = None
         self._values: dict[str, Span] = {}
-        self._errors: dict[str, Reason] = {}
-        self._inhibits: dict[str, Reason] = {}
+        self._errors: dict[_Named, Reason] = {}
+        self._inhibits: dict[_Named, Reason] = {}
 
     def sample(self, handle: IndustrialRobotStatusHandle, at: int) -> None:
         status, detail = handle.status, handle.detail
@@ -146,12 +162,14 @@ class _Recorder:
         self._seen = status, detail
         vehicle = self.vehicle
         vehicle.system, vehicle.component = detail.system, detail.component
+        vehicle.members = detail.members
+        vehicle.name = detail.vehicle.name
         vehicle.autopilot = detail.vehicle.autopilot or vehicle.autopilot
         vehicle.type = detail.vehicle.type or vehicle.type
         for name, value in values_of(status, detail).items():
             self._value(name, value, handle.evidence, at)
-        errors = [Reason(at, at, error.name, error.code, error.text) for error in detail.errors]
-        inhibits = [Reason(at, at, inhibit.name, None, inhibit.text) for inhibit in detail.inhibits]
+        errors = [Reason(at, at, error.name, error.code, error.text, error.handle) for error in detail.errors]
+        inhibits = [Reason(at, at, one.name, None, one.text, one.handle) for one in detail.inhibits]
         _follow(self._errors, vehicle.errors, errors, at)
         _follow(self._inhibits, vehicle.inhibits, inhibits, at)
 
@@ -184,20 +202,22 @@ def values_of(status: RobotStatus, detail: Detail) -> dict[str, str]:
 
 
 def _armed(detail: Detail) -> TriState:
-    """Whether the autopilot is armed. A connected vehicle that is not armed has the inhibit DISARMED."""
-    if detail.link is not LinkState.CONNECTED:
+    """Whether the autopilot is armed. A connected vehicle that is not armed has the inhibit DISARMED.
+
+    A group has no autopilot of its own.
+    """
+    if detail.link is not LinkState.CONNECTED or detail.members:
         return TriState.UNKNOWN
     return TriState(all(inhibit.name != "DISARMED" for inhibit in detail.inhibits))
 
 
-def _follow(is_open: dict[str, Reason], closed: list[Reason], active: Iterable[Reason], at: int) -> None:
+def _follow(is_open: dict[_Named, Reason], closed: list[Reason], active: Iterable[Reason], at: int) -> None:
     """Close reasons that ended or have a new text; open new ones."""
-    now = {reason.name: reason for reason in active}
-    for name, reason in list(is_open.items()):
-        if name not in now or now[name].text != reason.text:
-            _close(closed, is_open.pop(name), at)
-    for name, reason in now.items():
-        is_open.setdefault(name, reason)
+    now = {(reason.title, reason.text): reason for reason in active}
+    for key in [key for key in is_open if key not in now]:
+        _close(closed, is_open.pop(key), at)
+    for key, reason in now.items():
+        is_open.setdefault(key, reason)
 
 
 def _close(into: list[Span] | list[Reason], what: Span | Reason, at: int) -> None:

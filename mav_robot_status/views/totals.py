@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
+
+from mav_robot_status.values import NamedTuple
+
+from ..interface import LinkState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Sequence
 
     from .timeline import Reason, Span, VehicleTimeline
 
@@ -25,6 +29,13 @@ class ReasonTotal(NamedTuple):
     """Its active time in microseconds."""
     texts: tuple[str, ...]
     """Its different texts, at most MOST_TEXTS."""
+    handle: str | None = None
+    """The member of a group that reports it; None for a single robot."""
+
+    @property
+    def title(self) -> str:
+        """As that of a `Reason`."""
+        return self.name if self.handle is None else f"{self.handle}: {self.name}"
 
 
 class ArmCycle(NamedTuple):
@@ -47,17 +58,24 @@ class Totals(NamedTuple):
     errors: tuple[ReasonTotal, ...]
     inhibits: tuple[ReasonTotal, ...]
     """Errors and inhibits are in order of their active time, the longest first."""
+    linked: int
+    """The time in which the link was connected."""
+    linked_values: dict[str, dict[str, int]]
+    """The time of each track in each value while the link was connected."""
 
 
 def totals(vehicle: VehicleTimeline) -> Totals:
     """Add up a vehicle's timeline."""
     values = {name: durations(spans) for name, spans in vehicle.tracks.items()}
+    linked = [span for span in vehicle.tracks["link"] if span.value == LinkState.CONNECTED.value]
     return Totals(
         sum(values["link"].values()),
         values,
         arm_cycles(vehicle.tracks["armed"]),
         reason_totals(vehicle.errors),
         reason_totals(vehicle.inhibits),
+        sum(span.end - span.start for span in linked),
+        {name: durations(within(spans, linked)) for name, spans in vehicle.tracks.items()},
     )
 
 
@@ -67,6 +85,18 @@ def durations(spans: Iterable[Span]) -> dict[str, int]:
     for span in spans:
         lasted[span.value] += span.end - span.start
     return dict(sorted(lasted.items(), key=lambda item: -item[1]))
+
+
+def within(spans: Iterable[Span], others: Sequence[Span]) -> Iterator[Span]:
+    """The parts of spans inside others. Both are in order of time, without overlaps."""
+    first = 0
+    for span in spans:
+        while first < len(others) and others[first].end <= span.start:
+            first += 1
+        for other in others[first:]:
+            if other.start >= span.end:
+                break
+            yield span._replace(start=max(span.start, other.start), end=min(span.end, other.end))
 
 
 def arm_cycles(armed: Iterable[Span]) -> tuple[ArmCycle, ...]:
@@ -85,19 +115,20 @@ def arm_cycles(armed: Iterable[Span]) -> tuple[ArmCycle, ...]:
 
 
 def reason_totals(reasons: Iterable[Reason]) -> tuple[ReasonTotal, ...]:
-    """Add up reasons by name. A new text does not begin a new occurrence."""
+    """Add up reasons by title. A new text does not begin a new occurrence, and texts at the same time count once."""
     found: dict[str, ReasonTotal] = {}
     ended: dict[str, int] = {}
     for reason in sorted(reasons, key=lambda reason: reason.start):
-        name = reason.name
-        before = found.get(name) or ReasonTotal(name, reason.code, 0, 0, ())
+        title = reason.title
+        before = found.get(title) or ReasonTotal(reason.name, reason.code, 0, 0, (), reason.handle)
         texts = before.texts
         if reason.text is not None and reason.text not in texts and len(texts) < MOST_TEXTS:
             texts = (*texts, reason.text)
-        found[name] = before._replace(
-            occurrences=before.occurrences + (ended.get(name) != reason.start),
-            active=before.active + reason.end - reason.start,
+        end = ended.get(title, -1)
+        found[title] = before._replace(
+            occurrences=before.occurrences + (end < reason.start),
+            active=before.active + max(0, reason.end - max(reason.start, end)),
             texts=texts,
         )
-        ended[name] = reason.end
+        ended[title] = max(reason.end, end)
     return tuple(sorted(found.values(), key=lambda total: -total.active))

@@ -12,6 +12,7 @@ import pytest
 
 from mav_robot_status.testing import FakeAutopilot, ManualClock, ardurover
 
+from ..loopback import LOOPBACK
 from .documents import ROOT
 
 
@@ -42,6 +43,8 @@ def place(tmp_path: pathlib.Path, flight_log: pathlib.Path, monkeypatch: pytest.
     shutil.copy(flight_log, tmp_path)
     shutil.copytree(ROOT / "config", tmp_path / "config")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("PATH", str(pathlib.Path(sys.executable).parent), prepend=os.pathsep)
     return tmp_path

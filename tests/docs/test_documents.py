@@ -9,11 +9,11 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import json
 import pathlib
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -38,14 +38,21 @@ from mav_robot_status.interface import (
 from mav_robot_status.publishers import json_lines
 
 from ..deadline import allow
+from ..ports import free_port
 from ..system.bridges import PtyBridge
+from ..system.screen import Screen
 from .documents import DOCUMENTS, ROOT, Block, blocks, links, name_of, prose
 
 SCHEMA = ROOT / "mav_robot_status" / "data" / "robot_status.schema.json"
 SETUP = "python3 -m venv .venv && .venv/bin/pip install -q "
 TESTS = SETUP + "-e '.[dev]' && .venv/bin/python -m pytest"
 DEMO = SETUP + ". && .venv/bin/mav-robot-status demo"
-GENERATORS = {".venv/bin/python dialects/generate.py": ".", ".venv/bin/python docs/make_reference.py": "autopilots.md"}
+FAKES = "python -m mav_robot_status.testing.mobile_manipulator"
+GENERATORS = {
+    ".venv/bin/python dialects/generate.py": ".",
+    ".venv/bin/python docs/make_reference.py": "autopilots.md",
+    ".venv/bin/python docs/make_man.py": "page.1",
+}
 """What they write to, in the folder of the test."""
 SCOREBOARD = ".venv/bin/python docs/make_scoreboard.py"
 MEASUREMENTS = (".venv/bin/python -m bench", SCOREBOARD)
@@ -105,11 +112,14 @@ def test_a_line_is_what_the_publisher_writes(block: Block) -> None:
 
 def _native(shown: dict[str, Any]) -> str:
     """The line that the publisher writes for the values in a document."""
-    causes = tuple(ErrorCause(e["code"], e["name"], e["text"], _us(e["since"])) for e in shown["errors"])
-    inhibits = tuple(Inhibit(i["name"], i["text"], _us(i["since"])) for i in shown["inhibits"])
+    causes = tuple(
+        ErrorCause(e["code"], e["name"], e["text"], _us(e["since"]), e.get("handle")) for e in shown["errors"]
+    )
+    inhibits = tuple(Inhibit(i["name"], i["text"], _us(i["since"]), i.get("handle")) for i in shown["inhibits"])
     values = {name: TriState(-1 if shown[name] is None else shown[name]) for name in RobotStatus._fields[1:-1]}
     status = RobotStatus(mode=RobotMode[shown["mode"]], **values, error_code=shown["error_code"])
-    detail = Detail(shown["system"], shown["component"], causes, inhibits, Vehicle(**shown["vehicle"]))
+    vehicle, members = Vehicle(**shown["vehicle"]), tuple(shown.get("members", ()))
+    detail = Detail(shown["system"], shown["component"], causes, inhibits, vehicle, members=members)
     msg = RobotStatusMsg(shown["handle"], _us(shown["stamp"]), status, detail, shown["link"]["heartbeat_age"])
     return json_lines.native(msg, shown["seq"], json_lines.native_body(msg.handle, status, detail))
 
@@ -139,6 +149,10 @@ def test_a_command_does_what_it_says(block: Block, command: str, place: pathlib.
         assert command == " && ".join(_ci()[:3])
     elif command == DEMO:
         _runs_until_stopped(place, ["mav-robot-status", "demo"], signal.SIGINT)
+    elif command.startswith("mav-robot-status demo "):
+        _runs_until_stopped(place, _with_free_ports(place, command).split(), signal.SIGINT)
+    elif command == FAKES:
+        _plays_until_stopped([sys.executable, *command.split()[1:], "--arm", "0", "--dashboard", "0"])
     elif (target := GENERATORS.get(command)) is not None:
         subprocess.run([sys.executable, ROOT / command.split()[1], place / target], check=True, timeout=allow(PATIENCE))
     elif command.startswith(MEASUREMENTS):  # they take minutes: here they only list their cases
@@ -146,6 +160,10 @@ def test_a_command_does_what_it_says(block: Block, command: str, place: pathlib.
         assert subprocess.run(measurement, cwd=ROOT, capture_output=True, check=True, timeout=allow(PATIENCE)).stdout
     elif command.startswith(".venv/bin/"):
         assert command in _ci()
+    elif command.startswith("mav-robot-status px4-events fetch "):
+        _fetches(place, _with_free_ports(place, command))
+    elif "dds://" in command and importlib.util.find_spec("cyclonedds") is None:
+        pytest.skip("cyclonedds is not installed: it has no wheel for this Python or processor")
     elif command.startswith("mav-robot-status ") and re.search(r" udp:| /dev/tty| --config ", command):
         _runs_until_stopped(place, _with_free_ports(place, command).split(), signal.SIGTERM)
     elif command.startswith("mav-robot-status "):
@@ -156,9 +174,29 @@ def test_a_command_does_what_it_says(block: Block, command: str, place: pathlib.
         pytest.fail(f"{block.name}: nothing here checks this command: {command}")
 
 
-def test_the_readme_starts_with_the_command_the_demo_and_the_tests() -> None:
+def test_the_readme_starts_with_the_demo_the_command_and_the_tests() -> None:
     commands = [command for block, command in COMMANDS if block.document.name == "README.md"]
-    assert commands[:3] == ["mav-robot-status udp:127.0.0.1:14550", DEMO, TESTS]
+    assert commands[:3] == [DEMO, "mav-robot-status udp:127.0.0.1:14550", TESTS]
+
+
+def test_the_readme_shows_what_the_demo_shows() -> None:
+    """But for the words of the remedies, which are those of their own table."""
+    block = next(b for b in blocks("text") if b.document.name == "README.md")
+    wanted = [re.match(r"1\.1 .* 0s|Cannot move: |Next: |.*", line) for line in block.code.splitlines() if line]
+    assert len(wanted) >= 8
+    screen = Screen("demo")
+    try:
+        screen.wait_for(
+            lambda lines: all(any(line.startswith(one[0]) for line in lines) for one in wanted if one),
+            "screen as in the README",
+        )
+    finally:
+        screen.close()
+
+
+def test_the_readme_has_no_picture_that_an_index_of_packages_cannot_show() -> None:
+    pictures = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", (ROOT / "README.md").read_text())
+    assert all(picture.startswith("https://") for picture in pictures)
 
 
 def test_the_line_in_the_readme_is_from_a_rover_that_was_just_switched_on(place: pathlib.Path) -> None:
@@ -185,8 +223,8 @@ def _line_with(lines: Iterable[str], inhibits: list[dict[str, Any]]) -> dict[str
 
 
 def _ci() -> list[str]:
-    """The lines of .ci/run from the set-up on."""
-    lines = (ROOT / ".ci" / "run").read_text().splitlines()
+    """The lines of .ci/run from the set-up on, without indentation."""
+    lines = [line.strip() for line in (ROOT / ".ci" / "run").read_text().splitlines()]
     return lines[lines.index("python3 -m venv .venv") :]
 
 
@@ -208,10 +246,8 @@ def _beside_pymavlink(place: pathlib.Path, command: str) -> str:
 def _with_free_ports(place: pathlib.Path, command: str) -> str:
     """The command with free ports, also in the configurations in the folder."""
     configurations = {path: path.read_text() for path in (place / "config").glob("*.yaml")}
-    for port in sorted(set(re.findall(r":(145\d\d|8765)\b", command + "".join(configurations.values())))):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_port:
-            any_port.bind(("127.0.0.1", 0))
-            free = str(any_port.getsockname()[1])
+    for port in sorted(set(re.findall(r":(145\d\d|8765|11002)\b", command + "".join(configurations.values())))):
+        free = str(free_port())
         command = command.replace(port, free)
         configurations = {path: text.replace(port, free) for path, text in configurations.items()}
     for path, text in configurations.items():
@@ -244,6 +280,28 @@ def _runs_until_stopped(place: pathlib.Path, command: list[str], stop: signal.Si
         process.send_signal(stop)
 
 
+def _fetches(place: pathlib.Path, command: str) -> None:
+    """A PX4 that has the file is on the port of the command."""
+    *_, output = command.split()
+    with _vehicle(command.split(), testing.px4.READY, testing.event_files()):
+        _bash(command)
+    assert (place / output).stat().st_size > 100
+
+
+def _plays_until_stopped(command: list[str]) -> None:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        watchdog = threading.Timer(allow(PATIENCE), process.kill)
+        watchdog.start()
+        try:
+            assert process.stdout is not None
+            assert any(line.startswith("  0.0 s  ") for line in process.stdout)
+            process.send_signal(signal.SIGINT)
+            assert process.wait() == 0
+        finally:
+            watchdog.cancel()
+            process.kill()
+
+
 def _with_our_devices(place: pathlib.Path, command: list[str]) -> list[str]:
     return [part.replace("/dev/", f"{place}/") if part.startswith("/dev/tty") else part for part in command]
 
@@ -262,7 +320,9 @@ def _with_our_key(place: pathlib.Path, command: list[str]) -> list[str]:
 
 
 @contextmanager
-def _vehicle(command: list[str], scenario: testing.Scenario) -> Iterator[None]:
+def _vehicle(
+    command: list[str], scenario: testing.Scenario, files: testing.VehicleFiles | None = None
+) -> Iterator[None]:
     """A vehicle on each UDP port or serial device of the command."""
     key = KEY if "--signing-key" in command else None
     with ExitStack() as ended:
@@ -276,7 +336,7 @@ def _vehicle(command: list[str], scenario: testing.Scenario) -> Iterator[None]:
                 to = cable.address
             else:
                 continue
-            ended.enter_context(testing.FakeAutopilot(scenario, to=to, signing_key=key))
+            ended.enter_context(testing.FakeAutopilot(scenario, to=to, signing_key=key, files=files))
         yield
 
 

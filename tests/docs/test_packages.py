@@ -54,6 +54,27 @@ def test_a_publisher_is_found_by_its_entry_point(place: pathlib.Path, monkeypatc
     assert (place / "lamp.txt").read_text() == "off\n"
 
 
+def test_an_arm_is_found_by_its_entry_point_and_is_a_member_of_the_group(
+    place: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    configuration = installed(place, page("arm.md"), monkeypatch)
+    command = [sys.executable, "-m", "mav_robot_status.cli", "--config", "arm.yaml", "--changes-only"]
+    with socket.create_server(("127.0.0.1", 0)) as arm:
+        (place / "arm.yaml").write_text(configuration.code.replace("7000", str(arm.getsockname()[1])))
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as gateway:
+            assert gateway.stdout is not None
+            arm.settimeout(PATIENCE)
+            client, _ = arm.accept()
+            with client:
+                client.sendall(b"auto=1 stopped=1 powered=1 moving=0\n")
+                lines = map(json.loads, gateway.stdout)
+                line = next(line for line in lines if line["handle"] == "robot" and line["e_stopped"])
+            gateway.terminate()
+            _, log = gateway.communicate(timeout=PATIENCE)
+    assert (line["mode"], line["motion_possible"], line["inhibits"][0]["handle"]) == ("AUTO", False, "arm")
+    assert gateway.returncode == 0, log
+
+
 def test_a_link_is_found_by_its_entry_point(place: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shown = installed(place, page("link.md"), monkeypatch)
     assert shown.code.startswith("mav-robot-status unixgram:")

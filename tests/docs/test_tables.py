@@ -14,14 +14,19 @@ import pytest
 
 from mav_robot_status.commands import COMMANDS
 from mav_robot_status.config import Config, IdentityConfig, LinkConfig, SigningConfig, VehicleConfig
-from mav_robot_status.config.model import Or
 from mav_robot_status.config.reader import PARAMETERS
 from mav_robot_status.controller import DEFAULT_PUBLISH_RATE
 from mav_robot_status.gateway.controller_config import DEFAULT_PUBLISHERS
+from mav_robot_status.hardware.group import NOT_POSSIBLE
 from mav_robot_status.hardware.mavlink.causes import CAUSES
-from mav_robot_status.hardware.mavlink.options import HardwareOptions, Within
+from mav_robot_status.hardware.mavlink.options import HardwareOptions, Or, Within
 from mav_robot_status.hardware.mavlink.rules.inhibits import INHIBITS
-from mav_robot_status.interface import DEFAULT_HANDLE_NAME, Detail, RobotStatus
+from mav_robot_status.hardware.simple_message.interface import SimpleMessageHardwareOptions
+from mav_robot_status.hardware.simple_message.status import NO_CODE
+from mav_robot_status.hardware.ur.interface import UrOptions
+from mav_robot_status.hardware.ur.status import NOT_RUNNING, STOPS
+from mav_robot_status.interface import DEFAULT_HANDLE_NAME, Detail, Options, RobotStatus
+from mav_robot_status.interface.options import Declared
 from mav_robot_status.links.url import KINDS
 from mav_robot_status.publishers import metrics
 from mav_robot_status.publishers.json_lines import native_body
@@ -49,7 +54,7 @@ def test_the_keys_of_a_section_with_defaults_and_units(heading: str, kind: Any) 
     expected = [
         [field.name, _default(field, get_args(hints[field.name])), _unit(get_args(hints[field.name]))]
         for field in dataclasses.fields(kind)
-        if field.name not in ("controllers", "interfaces")  # every other key at the top; `hardware` as a list
+        if field.name not in ("controllers", "interfaces", "names")  # other keys at the top; parts of two lists
     ]
     assert [row[:3] for row in table("docs/reference/configuration.md", "key", heading)] == expected
 
@@ -85,8 +90,8 @@ def test_the_parameters_of_a_controller_with_their_defaults() -> None:
 
 
 def test_the_members_of_a_line() -> None:
-    body = native_body("", RobotStatus(), Detail())
-    members = re.findall(r'"(\w+)": ', re.sub(r"\{[^}]*\}?", "{}", body))
+    body = native_body("", RobotStatus(), Detail(members=("arm",)))
+    members = re.findall(r'"(\w+)": ', re.sub(r"\{[^}]*\}?|\[[^]]*\]", "{}", body))
     assert [row[0] for row in table("docs/reference/json.md", "member")] == ["stamp", "seq", *members]
 
 
@@ -113,8 +118,41 @@ def test_the_reasons_in_the_order_of_their_bits() -> None:
 
 
 def test_the_kinds_of_error_codes() -> None:
-    kinds = {code // 1000 for code in CAUSES}
+    kinds = {code // 1000 for code in CAUSES} | {NO_CODE // 1000}
     assert [int(row[0]) for row in table("docs/reference/json.md", "code / 1000")] == sorted(kinds)
+
+
+@pytest.mark.parametrize(
+    ("heading", "kind"), [("### `type: ur`", UrOptions), ("### `type: simple_message`", SimpleMessageHardwareOptions)]
+)
+def test_the_options_of_an_arm_with_their_defaults(heading: str, kind: type[Options]) -> None:
+    expected = [[one.name, *_default_and_bounds(one)] for one in kind.declared()]
+    assert [row[:3] for row in table("docs/reference/configuration.md", "key", heading)] == expected
+
+
+def _default_and_bounds(one: Declared) -> tuple[str, str]:
+    bounds = f"{one.option.low:g} to {one.option.high:g}" if one.kind is float else ""
+    if one.default is dataclasses.MISSING:
+        return "", bounds
+    return f"{one.default:g}" if isinstance(one.default, int | float) else str(one.default), bounds
+
+
+def test_the_error_codes_of_arms() -> None:
+    codes = {stop.code: stop.name for stop in STOPS if stop.code} | {NO_CODE: "CONTROLLER_ERROR"}
+    rows = table("docs/reference/arms.md", "code", "## Error codes")
+    assert [(int(code), name) for code, name, _ in rows] == sorted(codes.items())
+
+
+def test_the_inhibits_of_arms() -> None:
+    names = [stop.name for stop in STOPS] + [name for name, _ in NOT_RUNNING.values()]
+    others = ["NOT_RUNNING", "CONTROLLER_ERROR", NOT_POSSIBLE, "LINK_STALE"]
+    listed = [row[0] for row in table("docs/reference/arms.md", "name", "## Inhibits: why motion is not possible")]
+    assert listed == list(dict.fromkeys([*names, *others]))
+
+
+def test_the_fields_of_an_arm() -> None:
+    fields = [row[0] for row in table("docs/reference/arms.md", "field")]
+    assert fields == list(RobotStatus._fields[:-1])
 
 
 def test_the_fields_of_robot_status_with_their_types() -> None:

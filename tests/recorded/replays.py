@@ -57,6 +57,14 @@ def broken_invariants(line: dict[str, Any]) -> Iterator[str]:
         yield "error_code is the first of errors"
 
 
+def reasons_not_to_arm(log: pathlib.Path, seconds: float) -> list[str | None]:
+    """The texts of the reasons why the vehicle of a log cannot be armed, `seconds` after its first line."""
+    rows = [json.loads(line) for line in lines_of(log)]
+    stamps = [datetime.fromisoformat(row["stamp"].replace("Z", "+00:00")).timestamp() for row in rows]
+    row = rows[bisect.bisect_right(stamps, stamps[0] + seconds) - 1]
+    return [inhibit["text"] for inhibit in row["inhibits"] if inhibit["name"] == "PREARM_FAILING"]
+
+
 class Judgement(NamedTuple):
     """The verdict on one checkpoint: right, honest (an accepted UNKNOWN), unknown, WRONG or missing."""
 

@@ -18,7 +18,7 @@ from mav_robot_status.interface import RobotStatusMsg, validate
 from mav_robot_status.publishers.json_lines import JsonLinesPublisher
 
 from ..unit.hardware.mavlink.settled import Witness, ignore_table, omissions
-from .replays import NO_LARGE_SET, OURS, SHARED, broken_invariants, judged, lines_of
+from .replays import NO_LARGE_SET, OURS, SHARED, broken_invariants, judged, lines_of, reasons_not_to_arm
 
 LOGS = sorted(OURS.glob("*.tlog"))
 TRUTHS = sorted(OURS.glob("*.truth.json"))
@@ -120,6 +120,43 @@ def test_most_answers_are_right_rather_than_unknown() -> None:
     shares = {field: right[field] / total[field] for field in total}
     assert set(shares) == set(LEAST_RIGHT)
     assert all(shares[field] >= least for field, least in LEAST_RIGHT.items()), shares
+
+
+@pytest.mark.parametrize(
+    ("seconds", "expected"),
+    [
+        (20.0, [None]),
+        (46.0, ["PreArm: Motors Emergency Stopped"]),
+        (61.0, ["Arm: Hardware safety switch", "Arm: Check mag field (xy diff:171>100)"]),
+        (75.0, ["PreArm: GPS 1: Bad fix"]),
+        (89.0, ["Arm: Compass not healthy"]),
+        (91.0, []),
+    ],
+)
+def test_a_recorded_rover_names_every_reason_why_it_refuses_to_arm(seconds: float, expected: list[str | None]) -> None:
+    assert reasons_not_to_arm(OURS / "ardurover-4.5.6-arm-denied.tlog", seconds) == expected
+
+
+AT_FIRST = ["PreArm: Accels inconsistent", "PreArm: AHRS: waiting for home"]
+BOOTS = {
+    "arduboat-4.5.6": ["PreArm: AHRS: not using configured AHRS type"],
+    "arducopter-4.5.6": ["PreArm: Need Position Estimate"],
+    "arducopter-4.7.0-dev-90700977c5": ["PreArm: Need Position Estimate"],
+    "arduplane-4.5.6": [],
+    "arduquadplane-4.5.6": [],
+    "ardurover-4.5.6": ["PreArm: AHRS: not using configured AHRS type"],
+    "ardurover-4.7.0-dev-90700977c5": ["PreArm: AHRS: not using configured AHRS type"],
+}
+"""The reasons half a minute after the boot; a plane can be armed by then."""
+
+
+@pytest.mark.skipif(not SHARED_LOGS, reason=NO_LARGE_SET)
+@pytest.mark.parametrize("name", BOOTS)
+def test_every_ardupilot_names_all_reasons_of_its_boot_and_none_that_ended(name: str) -> None:
+    log = SHARED / "sitl" / f"{name}-boot.tlog"
+    assert reasons_not_to_arm(log, 8.0) == AT_FIRST
+    assert reasons_not_to_arm(log, 32.0) == BOOTS[name]
+    assert reasons_not_to_arm(log, 42.0) == []
 
 
 @pytest.mark.slow

@@ -14,6 +14,8 @@ import tty
 from abc import ABC, abstractmethod
 from pathlib import Path
 
+from ..ports import free_port
+
 
 class Bridge(ABC):
     """Bytes from a UDP socket to a stream and back, in a thread."""
@@ -129,7 +131,7 @@ class TcpServerBridge(Bridge):
 
     def __init__(self) -> None:
         super().__init__()
-        self.port = 0
+        self.port = free_port()
         self._server: socket.socket | None = None
         self._client: socket.socket | None = None
 
@@ -138,7 +140,6 @@ class TcpServerBridge(Bridge):
         self._server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self._server.bind(("127.0.0.1", self.port))
         self._server.listen()
-        self.port = self._server.getsockname()[1]
 
     def _close(self) -> None:
         for end in (self._client, self._server):

@@ -17,6 +17,7 @@ from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
 from ..deadline import SOON, Deadline, allow, wait_until
+from ..ports import free_port
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/sbin")
 MISSING = (
@@ -27,12 +28,6 @@ MISSING = (
 PREFIX = "plant/robots"
 SETTLE = "settle"
 _NUMBERS = itertools.count()
-
-
-def free_port() -> int:
-    with socket.socket() as any_port:
-        any_port.bind(("127.0.0.1", 0))
-        return int(any_port.getsockname()[1])
 
 
 class Broker:
@@ -66,8 +61,18 @@ class Broker:
 
     def start(self) -> None:
         assert MOSQUITTO is not None
-        self.process = subprocess.Popen([MOSQUITTO, "-c", str(self._conf)], stderr=subprocess.DEVNULL)
-        wait_until(self._accepts, what=f"mosquitto does not start with {self._conf.read_text()}")
+        log = self._conf.with_suffix(".log")
+        with log.open("wb") as file:
+            self.process = subprocess.Popen([MOSQUITTO, "-c", str(self._conf)], stderr=file)
+        deadline = Deadline(SOON)
+        while not self._accepts():
+            why = f"mosquitto does not start:\n{self._conf.read_text()}\n{log.read_text()}"
+            assert not self._has_ended(), why
+            assert deadline.left, why
+            time.sleep(0.02)
+
+    def _has_ended(self) -> bool:
+        return self.process is not None and self.process.poll() is not None
 
     def _accepts(self) -> bool:
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), allow(1)):

@@ -27,8 +27,9 @@ from paho.mqtt.client import Client, MQTTMessage, MQTTv5
 from paho.mqtt.enums import CallbackAPIVersion
 
 from ..deadline import SOON, allow, wait_until
+from ..ports import free_port
 from .gateway_process import Gateway
-from .mqtt_broker import PREFIX, Broker, free_port
+from .mqtt_broker import PREFIX, Broker
 
 FOREVER = 1e6  # s: the gateways run until they are terminated
 CONNECTED = 60.0  # s on an idle machine until every robot is on the board

@@ -20,7 +20,9 @@ import pyte
 from ..deadline import SOON, Deadline, allow
 from .gateway_process import COMMAND
 
-PLAIN_ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TMUX", "COLUMNS")}
+PLAIN_ENVIRONMENT = {
+    name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TMUX", "COLUMNS", "LINES")
+}
 
 MARK = b"\0"
 """Written to the terminal after the program has ended: everything before it is the program's."""
@@ -103,6 +105,11 @@ class Screen:
     def attributes(self) -> Any:
         """The terminal's settings (termios)."""
         return termios.tcgetattr(self.terminal)
+
+    def stop_reading(self) -> None:
+        """Nobody reads the terminal any more, as on a line that is cut: its buffer fills up."""
+        self._stop.set()
+        self._thread.join()
 
     def close(self) -> None:
         """Kill the program if it still runs."""

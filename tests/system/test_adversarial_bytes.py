@@ -46,6 +46,7 @@ def flood() -> Iterator[Callable[[tuple[str, int], bytes], threading.Thread]]:
         thread.join()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", SHAPES)
 def test_statuses_are_in_time_during_a_flood(
     gateway: Callable[..., Gateway],

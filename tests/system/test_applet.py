@@ -124,6 +124,7 @@ def test_the_applet_makes_e_stopped_known_while_it_reports(
     gate.wait_for_log("applet")
 
 
+@pytest.mark.slow
 def test_explain_names_the_applet_as_the_evidence(vehicle: Callable[[Scenario], FakeAutopilot]) -> None:
     rover = vehicle(with_applet(armed(ardurover.READY)))
     rover.set(emergency_stop=True)
@@ -134,6 +135,7 @@ def test_explain_names_the_applet_as_the_evidence(vehicle: Callable[[Scenario], 
     assert report["applet"]["value"] == 1
 
 
+@pytest.mark.slow
 def test_explain_says_that_the_applet_is_not_heard(vehicle: Callable[[Scenario], FakeAutopilot]) -> None:
     report = found("explain", vehicle(armed(ardurover.READY)), lambda report: "applet" in report)
     assert report["applet"] is None

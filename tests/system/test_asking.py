@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +13,7 @@ from mav_robot_status.mavlink.definitions import Heartbeat
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.testing import FakeAutopilot, arducopter
 
+from ..ports import free_port
 from .gateway_process import Gateway, run
 from .wire import Wire
 
@@ -49,6 +49,7 @@ def test_a_copter_that_is_ready_at_once_after_a_reboot_is_asked_again_and_its_ol
     assert gate.stop() == 0
 
 
+@pytest.mark.slow
 def test_the_rates_of_streams_that_begin_late_are_not_lowered(
     gateway: Callable[..., Gateway], autopilot: Callable[..., FakeAutopilot]
 ) -> None:
@@ -94,6 +95,7 @@ def test_no_heartbeat_is_sent_with_the_id_of_a_ground_station_that_is_heard(
     assert sum("a ground station uses this id" in line for line in gate.log) == 1
 
 
+@pytest.mark.slow
 def test_explain_waits_for_the_parameters_of_a_live_copter(
     autopilot: Callable[..., FakeAutopilot], free_port: int
 ) -> None:
@@ -105,10 +107,6 @@ def test_explain_waits_for_the_parameters_of_a_live_copter(
     assert "no answer yet from vehicle 1.1" in done.stderr  # this copter has no RC5_OPTION
 
 
-@pytest.fixture
-def free_port() -> int:
-    """A UDP port that nobody uses."""
-    with socket.socket(type=socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-    return port
+@pytest.fixture(name="free_port")
+def fixture_free_port() -> int:
+    return free_port()

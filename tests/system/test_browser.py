@@ -1,25 +1,25 @@
-"""The page in a real browser."""
+"""The page in a real browser: what it shows of each state, and how it can be used."""
 
 from __future__ import annotations
 
 import signal
-import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from mav_robot_status.clock import now
-from mav_robot_status.publishers.board import Board
-from mav_robot_status.publishers.web.serve import serve
-from mav_robot_status.publishers.web.settings import WebSettings
 from mav_robot_status.testing import FakeAutopilot, ardurover
 
-from ..deadline import in_time
+from ..deadline import in_time, wait_until
+from ..ports import free_port
+from . import scenes
 from .browser import MISSING, Browser
 from .gateway_process import Gateway
+from .scenes import Page
 from .test_web import PAGE, url
 from .wire import Wire
 
@@ -27,11 +27,29 @@ pytestmark = pytest.mark.skipif(MISSING is not None, reason=MISSING or "")
 
 HANDLE = "industrial_robot_status_handle"
 NARROW = 360
-IN_VIEW = "document.querySelector('#connection').innerText === 'live'"
+LIVE = "document.querySelector('#connection').innerText === 'live'"
+WORD = "document.querySelector('#verdict strong')?.innerText"
+ORDER = "[...document.querySelectorAll('#rows th a')].map((one) => one.innerText)"
+OUTSIDE = (
+    "return [...document.querySelectorAll('header *, main *, footer *')].filter((one) => one.checkVisibility()"
+    " && one.getBoundingClientRect().right > innerWidth + 1).map((one) => one.outerHTML)"
+)
+AXE = (
+    "const [options, done] = arguments;"
+    "axe.run(options).then((found) => done(found.violations.map((one) => [one.id, one.nodes[0].html])))"
+)
+GROUP = scenes.group()
 
 
 def cell(head: str) -> str:
     return f"document.querySelector('#rows td[data-head=\"{head}\"]')?.innerText"
+
+
+def tile(title: str) -> str:
+    return (
+        f"[...document.querySelectorAll('#tiles > div')].find((one) => one.innerText.startsWith('{title}'))"
+        "?.querySelector('.chip').innerText"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -40,10 +58,16 @@ def window() -> Iterator[Browser]:
         yield browser
 
 
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    with Page() as shown:
+        yield shown
+
+
 @pytest.fixture
 def browser(window: Browser) -> Iterator[Browser]:
     """The window with the light theme. At the end its console has no errors."""
-    window.size(1280, 800)
+    window.size(1280, 860)
     window.theme("light")
     window.log()
     yield window
@@ -52,9 +76,14 @@ def browser(window: Browser) -> Iterator[Browser]:
     assert bad == []
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as one:
-        return int(one.getsockname()[1])
+def look_at(browser: Browser, page: Page, lines: list[scenes.Line], place: str = "#/") -> None:
+    """Open the page with these robots on it."""
+    page.only(lines)
+    browser.driver.get("about:blank")
+    browser.driver.get(f"{page.url}{place}")
+    listed = "document.querySelectorAll('#rows tr').length"
+    one = len(lines) == 1 or place not in ("#/", "#?all")
+    browser.wait(f"{LIVE} && " + (f"{WORD} !== undefined" if one else f"{listed} === {len(lines)}"))
 
 
 def test_the_page_shows_arming_within_a_second(
@@ -64,33 +93,33 @@ def test_the_page_shows_arming_within_a_second(
     browser.driver.get(url(gate) + "/")
     browser.wait("!document.querySelector('#empty').hidden")
     rover = wire(gate.address).beating()
-    browser.wait(f"{cell('Drives')} === 'off'")
+    browser.wait(f"{tile('Drives')} === 'off'")
     rover.beat(armed=True)
     armed = time.time()
-    assert in_time(browser.wait(f"{cell('Drives')} === 'POWERED'") - armed, 1.0)
-    assert browser.ask(f"return {cell('E-stop')}") == "UNKNOWN"
+    assert in_time(browser.wait(f"{tile('Drives')} === 'POWERED'") - armed, 1.0)
+    assert browser.ask(f"return {tile('Emergency stop')}") == "unknown"
 
 
-def test_the_page_is_stale_until_a_restarted_gateway_answers(
+def test_nothing_is_known_on_the_page_until_a_restarted_gateway_answers(
     browser: Browser, gateway: Callable[..., Gateway], wire: Callable[..., Wire]
 ) -> None:
     page = ("--http", f"127.0.0.1:{free_port()}")
     gate = gateway("udpin:127.0.0.1:0", *page)
     rover = wire(gate.address).beating()
     browser.driver.get(url(gate) + "/")
-    browser.wait(f"{cell('Drives')} === 'off'")
-    assert browser.ask("return document.body.className") == ""
+    browser.wait(f"{tile('Drives')} === 'off'")
     gate.stop()
     browser.wait("document.body.classList.contains('stale')")
     assert "NOT CONNECTED" in browser.text("header")
-    banner = browser.text("#banner")
-    assert banner.startswith("No connection to the gateway since ")
-    assert "ago. The data shown is from then" in banner
-    assert browser.ask("return getComputedStyle(document.querySelector('#fleet')).filter") == "grayscale(1)"
+    assert browser.text("#banner").startswith("No connection to the gateway since ")
+    assert browser.ask(f"return {WORD}") == "UNKNOWN"
+    assert "It may be moving. Last known: CANNOT MOVE." in browser.text("#verdict")
+    assert browser.ask(f"return {tile('Drives')}") == "unknown"
+    assert "Last known: off" in browser.text("#tiles")
     again = gateway("udpin:127.0.0.1:0", *page)
     rover.to = again.address
     rover.beat(armed=True)
-    browser.wait(f"{IN_VIEW} && !document.body.classList.contains('stale') && {cell('Drives')} === 'POWERED'")
+    browser.wait(f"{LIVE} && !document.body.classList.contains('stale') && {tile('Drives')} === 'POWERED'")
     assert browser.ask("return document.querySelector('#banner').hidden")
 
 
@@ -100,44 +129,62 @@ def test_the_page_reports_a_silent_gateway(
     gate = gateway(*PAGE)
     wire(gate.address).beating()
     browser.driver.get(url(gate) + "/")
-    browser.wait(f"{cell('Drives')} === 'off'")
+    browser.wait(f"{tile('Drives')} === 'off'")
     gate.process.send_signal(signal.SIGSTOP)
     try:
         browser.wait("document.body.classList.contains('stale')")
     finally:
         gate.process.send_signal(signal.SIGCONT)
-    browser.wait(f"{IN_VIEW} && !document.body.classList.contains('stale')")
+    browser.wait(f"{LIVE} && !document.body.classList.contains('stale')")
 
 
 def test_the_page_reports_a_gateway_that_answers_while_its_loop_hangs(browser: Browser) -> None:
-    server = serve(Board(), WebSettings(port=0))
-    try:
-        server.turned = now().mono
-        browser.driver.get(server.url)
-        browser.wait(IN_VIEW)
-        server.turned = now().mono - 60
+    with Page() as page:
+        page.put(scenes.parked("rover"))
+        page.server.turned = now().mono
+        browser.driver.get(page.url)
+        browser.wait(LIVE)
+        page.server.turned = now().mono - 60
         browser.wait("document.querySelector('#banner').innerText.startsWith('The gateway has been stalled for 6')")
         assert browser.text("#connection") == "STALLED"
-        assert browser.ask("return document.body.className") == "stale"
-    finally:
-        server.close()
+        browser.wait(f"{WORD} === 'UNKNOWN'")
 
 
-def test_a_lost_link_is_shown(browser: Browser, gateway: Callable[..., Gateway], wire: Callable[..., Wire]) -> None:
+def test_a_lost_link_says_since_when_and_what_was_last_known(
+    browser: Browser, gateway: Callable[..., Gateway], wire: Callable[..., Wire]
+) -> None:
     gate = gateway(*PAGE)
     rover = wire(gate.address).beating()
     browser.driver.get(f"{url(gate)}/#/{HANDLE}")
-    browser.wait("document.querySelector('#verdict strong')?.innerText === 'MOTION NOT POSSIBLE'")
+    browser.wait(f"{WORD} === 'CANNOT MOVE'")
     rover.beating(False)
-    browser.wait("document.querySelector('#verdict strong').innerText === 'NO LINK'")
-    assert "LINK_STALE" in browser.text("#causes")
-    assert "It may move." in browser.text("#verdict")
-    assert browser.text("#tiles").count("UNKNOWN") == 6
-    browser.driver.get(f"{url(gate)}/#/")
-    browser.wait(f"{cell('Link')}?.startsWith('LOST')")
+    browser.wait(f"{WORD} === 'LOST'")
+    assert "Nothing is known since " in browser.text("#verdict")
+    assert "It may be moving. Last known: MANUAL" in browser.text("#verdict")
+    assert "why this is unknown" in browser.text("#causes").lower()
+    assert "motion" not in browser.text("#causes").lower()
+    assert browser.text("#tiles").count("unknown") == 6
+    assert "Last known: off" in browser.text("#tiles")
+    struck = "[...document.querySelectorAll('*')].map((one) => getComputedStyle(one).textDecorationLine)"
+    assert "line-through" not in browser.ask(f"return {struck}")
+    browser.driver.get(f"{url(gate)}/#?all")
+    browser.wait("document.querySelector('#rows .state')?.innerText === 'LOST'")
+    assert "Nothing is known since " in browser.text("#rows .why-cell")
 
 
-def test_a_vehicle_has_its_explanation_bands_and_changes(
+def test_a_loss_ends_no_error_in_the_list_of_changes(browser: Browser, page: Page) -> None:
+    page.only([])
+    for ago, state in ((50, scenes.in_error), (40, scenes.lost), (30, scenes.in_error), (20, scenes.moving)):
+        page.put(state("tug"), ago=ago)
+    browser.driver.get(f"{page.url}#/tug")
+    browser.wait("document.querySelector('#changes').innerText.includes('Error begins')")
+    changes = browser.text("#changes")
+    assert (changes.count("Error begins"), changes.count("Error ends")) == (1, 1)
+    assert "LINK_STALE" not in changes
+    assert "unknown" not in changes  # the link says it
+
+
+def test_a_robot_has_its_explanation_bands_and_changes(
     browser: Browser, gateway: Callable[..., Gateway], autopilot: Callable[..., FakeAutopilot]
 ) -> None:
     gate = gateway(*PAGE)
@@ -157,98 +204,229 @@ def test_a_vehicle_has_its_explanation_bands_and_changes(
     assert "off from " in drives
     assert "POWERED from " in drives
     assert "DISARMED" in browser.text("#changes")
-    browser.ask("location.hash = '#/'")
-    browser.wait("document.querySelector('#vehicle').hidden && document.querySelectorAll('#rows tr').length === 1")
 
 
-def test_texts_of_a_vehicle_are_not_interpreted_as_html(
-    browser: Browser, gateway: Callable[..., Gateway], autopilot: Callable[..., FakeAutopilot]
-) -> None:
-    gate = gateway(*PAGE)
-    fake = autopilot(ardurover.READY, gate.address)
-    gate.wait_for(lambda s: s["in_error"] is False)
-    fake.arm()
-    gate.wait_for(lambda s: s["drives_powered"] is True)
+def test_the_only_robot_is_shown_at_once_and_the_list_is_one_click_away(browser: Browser, page: Page) -> None:
+    look_at(browser, page, [scenes.parked("mower")])
+    assert browser.text("#vehicle-title") == "mower"
+    browser.driver.find_element("css selector", ".back a").click()
+    browser.wait(f"document.querySelector('#vehicle').hidden && {ORDER}.length === 1")
+    browser.driver.find_element("css selector", "#rows a").click()
+    browser.wait(f"!document.querySelector('#vehicle').hidden && {WORD} === 'CANNOT MOVE'")
+    look_at(browser, page, [scenes.parked("mower")])
+    page.put(scenes.parked("tug", 2))
+    browser.wait(f"{ORDER}.length === 2")
+
+
+def test_a_headline_has_its_reason_and_a_next_step_that_opens_the_help(browser: Browser, page: Page) -> None:
+    look_at(browser, page, [scenes.failing("mower")])
+    assert browser.ask(f"return {WORD}") == "CANNOT MOVE"
+    assert "The autopilot says “GPS 1: Bad fix”." in browser.text("#verdict")
+    quoted = browser.ask("return [...document.querySelectorAll('#verdict bdi')].map((one) => one.innerText)")
+    assert "GPS 1: Bad fix" in quoted  # kept apart from our words
+    assert "PREARM_FAILING" not in browser.text("#verdict")
+    browser.driver.find_element("css selector", "#verdict .step a").click()
+    browser.wait("document.querySelector('h2:target') !== null")
+    assert "help.html#gps" in browser.driver.current_url
+
+
+def test_problems_are_first_and_a_row_moves_only_when_its_rank_changes(browser: Browser, page: Page) -> None:
+    states = {"a": scenes.parked, "b": scenes.moving, "c": scenes.lost, "d": scenes.in_error, "e": scenes.stopped}
+    look_at(browser, page, [state(name, n) for n, (name, state) in enumerate(states.items(), 1)])
+    assert browser.ask(f"return {ORDER}") == ["e", "d", "c", "b", "a"]
+    page.put(scenes.in_error("a", 1))
+    browser.wait(f"{ORDER}.join('') === 'eadcb'")
+    error = scenes.error(2001, "RADIO_FAILSAFE", "Radio Failsafe")
+    page.put(scenes.in_error("d", 4) | {"error_code": 2001, "errors": [error]})
+    browser.wait("document.querySelector('#rows').innerText.includes('Radio Failsafe')")
+    assert browser.ask(f"return {ORDER}") == ["e", "a", "d", "c", "b"]
+
+
+def test_counts_filter_and_a_search_finds_and_columns_sort(browser: Browser, page: Page) -> None:
+    look_at(browser, page, scenes.fleet(24))
+    counts = browser.ask("return [...document.querySelectorAll('#filters button')].map((one) => one.innerText)")
+    assert counts == ["24 All", "2 In error", "2 E-stopped", "4 Not heard", "8 Can move"]
+    button = browser.driver.find_elements("css selector", "#filters button")
+    button[3].click()
+    browser.wait(f"{ORDER}.length === 4")
+    assert set(browser.text("#rows .state").split("\n")) <= {"LOST", "NOT HEARD"}
+    button[3].click()
+    browser.wait(f"{ORDER}.length === 24")
+    search = browser.driver.find_element("id", "search")
+    search.send_keys("battery")
+    browser.wait(f"{ORDER}.length === 2")
+    search.send_keys(" of nobody")
+    browser.wait("!document.querySelector('#none').hidden")
+    search.clear()
+    search.send_keys(" ")
+    browser.wait(f"{ORDER}.length === 24")
+    browser.driver.find_element("css selector", "#head .robot button").click()
+    browser.wait("document.querySelector('#head .robot').getAttribute('aria-sort') === 'ascending'")
+    names = browser.ask(f"return {ORDER}")
+    assert names[:3] == ["Boat 16", "boat-6", "carrier-8"]
+    browser.driver.find_element("css selector", "#head .robot button").click()
+    browser.wait("document.querySelector('#head .robot').getAttribute('aria-sort') === 'descending'")
+    assert browser.ask(f"return {ORDER}") == names[::-1]
+
+
+def test_a_name_is_the_title(browser: Browser, page: Page) -> None:
+    one = scenes.parked(HANDLE)
+    look_at(browser, page, [one | {"vehicle": scenes.vehicle("HOLD", name="Rover A")}])
+    assert browser.text("#vehicle-title") == "Rover A"
+    assert HANDLE in browser.text("#who")
+
+
+def test_a_group_has_its_members_below_it_and_its_reasons_name_them(browser: Browser, page: Page) -> None:
+    look_at(browser, page, scenes.group())
+    rows = "return [...document.querySelectorAll('#rows tr')].map((row) => [row.querySelector('a').innerText, "
+    assert browser.ask(rows + "row.classList.contains('member')])") == [["robot", False], ["base", True], ["arm", True]]
+    assert browser.text("#filters").startswith("2 All")
+    browser.ask("location.hash = '#/robot'")
+    browser.wait("document.querySelectorAll('#members-rows tr').length === 2")
+    browser.wait(f"{WORD} === 'STOPPED IN PART'")
+    assert "Emergency stop engaged: arm. Another member may move" in browser.text("#verdict")
+    assert "arm: " in browser.text("#causes")
+    assert "E_STOPPED" in browser.text("#causes small")
+    members = "[...document.querySelectorAll('#members-rows td[data-head=\"E-stop\"]')].map((one) => one.innerText)"
+    assert browser.ask(f"return {members}") == ["no", "STOP"]
+    assert "base, arm" in browser.text("#who")
+    browser.ask("location.hash = '#/base'")
+    browser.wait("document.querySelector('#vehicle-title').innerText === 'base'")
+    assert browser.ask("return document.querySelector('#members').hidden") is True
+
+
+def test_texts_of_a_robot_are_not_interpreted_as_html(browser: Browser, page: Page) -> None:
     text = "<script>document.title='x'</script><img src=x>"
-    fake.say(0, text)
-    gate.wait_for(lambda s: s["errors"] and s["errors"][0]["text"] == text)
-    browser.driver.get(f"{url(gate)}/#/{HANDLE}")
-    browser.wait("document.querySelector('#causes').innerText.includes('<script>')")
-    assert text in browser.text("#causes")
-    assert text in browser.text("#changes")
+    hostile = scenes.in_error("tug") | {"in_error": True, "errors": [scenes.error(2004, text, text)]}
+    look_at(browser, page, [hostile | {"vehicle": scenes.vehicle(text, name=text)}])
+    browser.wait("document.querySelector('#changes').innerText.includes('Error begins')")
+    for part in ("#verdict", "#causes", "#changes", "#vehicle-title"):
+        assert text.lower() in browser.text(part).lower(), part
     assert browser.ask("return document.querySelectorAll('main script, main img').length") == 0
     assert browser.ask("return document.title") != "x"
 
 
-def test_everything_fits_on_a_phone(
-    browser: Browser, gateway: Callable[..., Gateway], autopilot: Callable[..., FakeAutopilot]
-) -> None:
-    gate = gateway(*PAGE)
-    autopilot(ardurover.READY, gate.address)
-    browser.size(NARROW, 740)
-    for place, there in (
-        ("#/", "document.querySelectorAll('#rows tr').length"),
-        (f"#/{HANDLE}", "document.querySelectorAll('#why tr').length"),
-    ):
-        browser.driver.get("about:blank")
-        browser.driver.get(f"{url(gate)}/{place}")
-        browser.wait(there)
-        outside = browser.ask(
-            "return [...document.querySelectorAll('header *, main *, footer *')].filter((one) => one.checkVisibility()"
-            " && !one.closest('thead') && one.getBoundingClientRect().right > innerWidth + 1)"
-            ".map((one) => one.outerHTML)"
+def test_twenty_robots_fit_on_a_screen_and_fifty_on_a_wall(browser: Browser, page: Page) -> None:
+    rows = "[...document.querySelectorAll('#rows tr')]"
+    lowest = f"return Math.max(...{rows}.map((one) => one.getBoundingClientRect().bottom))"
+    for number, size in ((20, (1280, 860)), (50, (1920, 1080))):
+        browser.size(*size)
+        look_at(browser, page, scenes.fleet(number))
+        assert browser.ask(lowest) <= size[1], number
+        assert browser.ask(OUTSIDE) == []
+
+
+@pytest.mark.slow
+def test_254_robots_stay_fluid(browser: Browser, page: Page) -> None:
+    look_at(browser, page, scenes.fleet(254))
+    browser.ask(
+        "window.long = 0;"
+        "new PerformanceObserver((list) => {"
+        "  for (const one of list.getEntries()) window.long = Math.max(window.long, one.duration)"
+        "}).observe({ type: 'longtask' })"
+    )
+    for n in range(5):
+        state = scenes.moving if n % 2 else scenes.parked
+        page.put(*(state(one["handle"], one["system"]) for one in scenes.fleet(254)[:60]))
+        word = "MOVING" if n % 2 else "CANNOT MOVE"
+        browser.wait(
+            f"[...document.querySelectorAll('#rows .state')].filter((one) => one.textContent === '{word}').length > 50"
         )
-        assert outside == []
+    assert in_time(browser.ask("return window.long") / 1000, 0.4)
+
+
+def test_everything_fits_on_a_phone(browser: Browser, page: Page) -> None:
+    browser.size(NARROW, 740)
+    for lines in (scenes.fleet(12), [scenes.in_error("a-robot-with-a-long-name-1")], [scenes.lost("rover")]):
+        look_at(browser, page, lines)
+        assert browser.ask(OUTSIDE) == []
     assert browser.ask("return parseFloat(getComputedStyle(document.querySelector('#verdict strong')).fontSize)") >= 28
     assert browser.ask("return document.querySelector('#verdict').getBoundingClientRect().bottom < innerHeight")
 
 
-def test_the_page_can_be_used_with_the_keyboard_alone(
-    browser: Browser, gateway: Callable[..., Gateway], wire: Callable[..., Wire]
-) -> None:
+def test_the_page_can_be_used_with_the_keyboard_alone(browser: Browser, page: Page) -> None:
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
 
-    gate = gateway(*PAGE)
-    rover = wire(gate.address).beating()
-    browser.driver.get(url(gate) + "/")
-    browser.wait(f"{cell('Drives')} === 'off'")
-    ActionChains(browser.driver).send_keys(Keys.TAB, Keys.TAB).perform()
+    look_at(browser, page, [scenes.parked("tug"), scenes.parked("mower", 2)])
     focused = "document.activeElement.closest('#rows') !== null"
-    assert browser.ask(f"return {focused}")
-    rover.beat(armed=True)
-    browser.wait(f"{cell('Drives')} === 'POWERED'")
-    assert browser.ask(f"return {focused}")  # a change keeps the focus
+    stops = 0
+    while not browser.ask(f"return {focused}"):
+        ActionChains(browser.driver).send_keys(Keys.TAB).perform()
+        stops += 1
+        assert stops < 30
+    ActionChains(browser.driver).send_keys(Keys.TAB).perform()
+    page.put(scenes.ready("tug"))
+    browser.wait(f"{cell('Drives')} === 'ON'")
+    assert browser.ask(f"return {ORDER}") == ["tug", "mower"]
+    assert browser.ask("return document.activeElement.innerText") == "tug"  # a row keeps the focus when it moves
     ActionChains(browser.driver).send_keys(Keys.ENTER).perform()
     browser.wait("document.activeElement.id === 'vehicle-title' && !document.querySelector('#vehicle').hidden")
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_text_has_enough_contrast(
-    browser: Browser, gateway: Callable[..., Gateway], wire: Callable[..., Wire], theme: str
-) -> None:
-    gate = gateway(*PAGE)
-    wire(gate.address).beating()
-    browser.theme(theme)
-    browser.driver.get(url(gate) + "/")
-    browser.wait(f"{cell('Drives')} === 'off'")
-    contrasts = browser.ask(
-        """
-        const style = getComputedStyle(document.documentElement);
-        const light = (name) => {
-            const hex = style.getPropertyValue(name).trim();
-            const parts = [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
-            const linear = parts.map((v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
-            return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
-        };
-        const ground = light("--surface");
-        return ["--ink", "--soft", "--good", "--caution", "--danger", "--active", "--unknown"].map((name) => {
-            const [high, low] = [light(name), ground].sort((a, b) => b - a);
-            return (high + 0.05) / (low + 0.05);
-        });
-        """
+def test_a_new_alarm_is_marked_until_a_person_acknowledges_it(browser: Browser) -> None:
+    with Page(alarm=True) as page:
+        look_at(browser, page, [scenes.moving("tug"), scenes.parked("mower", 2)])
+        assert browser.text("#sound") == "Sound off: click once to turn it on"
+        assert browser.ask("return document.querySelector('#alarms').hidden")
+        page.put(scenes.in_error("tug"), scenes.stopped("mower", 2))
+        browser.wait("document.querySelectorAll('#alarm-list li').length === 2")
+        assert browser.ask("return document.title").startswith("▲ NEW")
+        assert browser.ask("return document.querySelectorAll('#rows tr.new').length") == 2
+        browser.driver.find_element("id", "acknowledge").click()
+        browser.wait(
+            "document.querySelector('#alarms').hidden && document.querySelectorAll('#rows tr.new').length === 0"
+        )
+        assert browser.text("#sound") == "Sound on"  # the click allowed it
+        page.put(scenes.lost("tug"))
+        browser.wait("document.querySelectorAll('#alarm-list li').length === 1")
+        page.put(scenes.in_error("tug"))  # heard again: its error is not new, and the loss stays marked
+        browser.wait("document.querySelectorAll('#rows tr.alarm').length === 2")
+        assert "LOST" in browser.text("#alarm-list")
+        assert browser.ask("return document.querySelectorAll('#alarm-list li').length") == 1
+
+
+def test_a_page_that_a_person_left_keeps_no_connection(browser: Browser) -> None:
+    with Page() as page:
+        for _ in range(8):  # a browser has six connections to a server
+            look_at(browser, page, [scenes.parked("tug")])
+        browser.driver.get("about:blank")
+        wait_until(lambda: not page.server.watched)
+
+
+def test_without_the_option_there_are_no_alarms(browser: Browser, page: Page) -> None:
+    look_at(browser, page, scenes.fleet(12))
+    assert browser.ask("return document.querySelector('#alarms').hidden && document.querySelector('#sound').hidden")
+
+
+@pytest.mark.slow
+def test_axe_finds_nothing_in_any_state_light_or_dark(browser: Browser, page: Page) -> None:
+    axe = Path(pytest.importorskip("axe_core_python", reason="pip install -e '.[dev]'").__file__).with_name(
+        "axe.min.js"
     )
-    assert min(contrasts) > 4.5  # WCAG 2 AA
+    script = axe.read_text("utf-8")
+    found: dict[str, Any] = {}
+    for lines, place in (
+        *(([state("rover")], "#/") for state in scenes.STATES),
+        (scenes.fleet(12), "#/"),
+        (GROUP, "#/robot"),
+    ):
+        look_at(browser, page, lines, place)
+        browser.ask(script)
+        found |= {f"{lines} {one}": one for one in inspected(browser)}
+    browser.driver.get(f"{page.url}help.html")
+    browser.ask(script)
+    found |= {f"help {one}": one for one in inspected(browser)}
+    assert found == {}
+
+
+def inspected(browser: Browser) -> list[Any]:
+    """What axe finds in the light theme, and of the colours in the dark one."""
+    found = list(browser.driver.execute_async_script(AXE, {}))
+    browser.theme("dark")
+    found += browser.driver.execute_async_script(AXE, {"runOnly": ["color-contrast"]})
+    browser.theme("light")
+    return found
 
 
 def test_a_token_opens_the_page(
@@ -266,9 +444,9 @@ def test_a_token_opens_the_page(
     field.send_keys("wrong\n")
     browser.wait("!document.querySelector('#wrong').hidden")
     field.send_keys("correct-horse-battery\n")
-    browser.wait(f"{cell('Drives')} === 'off'")
+    browser.wait(f"{tile('Drives')} === 'off'")
     browser.ask("sessionStorage.clear()")
     browser.driver.get("about:blank")
     browser.driver.get(f"{url(gate)}/#token=correct-horse-battery")
-    browser.wait(f"{cell('Drives')} === 'off'")
+    browser.wait(f"{tile('Drives')} === 'off'")
     assert "horse" not in browser.driver.current_url

@@ -7,7 +7,6 @@ import ctypes
 import fcntl
 import json
 import os
-import random
 import re
 import socket
 import termios
@@ -25,10 +24,12 @@ from mav_robot_status.diagnosis.doctor.diagnosis import CASES
 from mav_robot_status.mavlink.definitions import Heartbeat, SysStatus, SystemTime
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.signing import Signer
-from mav_robot_status.testing import FakeAutopilot, ardurover
+from mav_robot_status.testing import FakeAutopilot, Scenario, arducopter, ardurover, px4
+from mav_robot_status.testing.scenario import by_satellite
 from tests.docs.documents import table
 
 from ..deadline import Deadline, allow, in_time
+from ..ports import free_port
 from .gateway_process import run
 
 ROOT = Path(__file__).parents[2]
@@ -71,15 +72,6 @@ class Source:
 def port() -> int:
     """A free UDP port."""
     return free_port(socket.SOCK_DGRAM)
-
-
-def free_port(kind: socket.SocketKind) -> int:
-    """A port outside the range that the system gives to clients, so that nobody takes it before its use."""
-    while True:
-        number = random.randrange(20_000, 30_000)
-        with socket.socket(socket.AF_INET, kind) as any_port, contextlib.suppress(OSError):
-            any_port.bind(("0.0.0.0", number))
-            return number
 
 
 @pytest.fixture
@@ -456,6 +448,19 @@ def test_without_a_problem_doctor_ends_early(port: int, autopilot: Callable[...,
     assert report["loss_percent"] == 0
 
 
+@pytest.mark.parametrize(("quad", "name"), [(px4.READY, "PX4"), (arducopter.READY, "ARDUPILOTMEGA")])
+def test_a_vehicle_behind_a_satellite_has_a_status(
+    port: int, autopilot: Callable[..., FakeAutopilot], quad: Scenario, name: str
+) -> None:
+    autopilot(by_satellite(quad, hz=2.0), ("127.0.0.1", port))
+    report = examined("high-latency", f"udp:127.0.0.1:{port}", seconds=1)
+    says(report, "1.1 is heard by HIGH_LATENCY2 only", "let the autopilot send HEARTBEAT there")
+    assert report["ok"]
+    (vehicle,) = report["speakers"]
+    assert (vehicle["autopilot"], list(vehicle["rates"])) == (name, ["HIGH_LATENCY2"])
+    assert vehicle["status"]["e_stopped"] is None
+
+
 def test_a_vehicle_is_found_by_speaking_first() -> None:
     with FakeAutopilot(ardurover.READY._replace(streams={1: 4.0})) as waiting:
         report = examined("ok", f"udpout:127.0.0.1:{waiting.address[1]}", seconds=2)
@@ -489,6 +494,68 @@ def test_a_recorded_log() -> None:
     assert (report["frames"], report["seconds"]) == (5031, 96.0)
     assert report["bytes"] == LOG.stat().st_size
     assert report["speakers"][0]["status"]["flight_mode"] == "AUTO"
+
+
+def recorded(path: Path, *parts: tuple[float, float, Heartbeat, int]) -> Path:
+    """A log with these senders: from second, to second, heartbeat, system. Autopilots send SYS_STATUS too."""
+    frames: list[tuple[float, bytes]] = []
+    for start, end, heartbeat, system in parts:
+        messages: list[Any] = [heartbeat] if heartbeat is GCS else [heartbeat, SYS_STATUS]
+        frames += [
+            (at, encode(message, system=system, component=1, sequence=(2 * n + i) & 255))
+            for n, at in enumerate(range(round(start), round(end) + 1))
+            for i, message in enumerate(messages)
+        ]
+    frames.sort(key=lambda one: one[0])
+    path.write_bytes(
+        b"".join(round(1.8e15 + at * 1e6).to_bytes(8, "big") + frame for at, frame in frames),
+    )
+    return path
+
+
+def test_a_log_that_ends_in_silence_says_what_was_heard_and_until_when(tmp_path: Path) -> None:
+    log = recorded(tmp_path / "quiet.tlog", (0, 252, ROVER, 1), (0, 1812, GCS, 255))
+    done = run("doctor", "-q", str(log))
+    first, *lines, last = done.stdout.splitlines()
+    assert done.returncode == 0, "a status can be had from it"
+    assert first.endswith("the autopilot 1.1 was heard for 4 min 12 s; the log ends 26 min 0 s later in silence [ok]")
+    assert "a status is available" not in done.stdout
+    (status,) = (line for line in lines if line.startswith("  status"))
+    assert status.startswith("  status when it was last heard: mode MANUAL, e_stopped ")
+    assert "drives_powered FALSE" in status
+    assert "  inhibits: DISARMED" in lines
+    assert last == f"next: mav-robot-status explain {log} --at 2027-01-15T08:04:12.000000Z"
+    assert run("explain", "-q", *last.split()[3:]).stdout.startswith(
+        "vehicle 1.1 (ARDUPILOTMEGA, GROUND_ROVER, MANUAL)"
+    )
+
+
+def test_the_json_of_a_log_that_ends_in_silence_has_its_end_and_its_last_status(tmp_path: Path) -> None:
+    log = recorded(tmp_path / "quiet.tlog", (0, 100, ROVER, 1), (200, 300, ROVER, 1), (0, 400, GCS, 255))
+    rover, station = examined("ok", str(log))["speakers"]
+    assert rover["status"]["drives_powered"] is None, "the status is that of the end of the log"
+    heard = rover["heard"]
+    assert (heard["seconds"], heard["times"], heard["silence"]) == (200, 2, 100)
+    assert heard["until"] == "2027-01-15T08:05:00.000000Z"
+    assert (heard["status"]["drives_powered"], heard["status"]["inhibits"]) == (False, ["DISARMED"])
+    assert station["heard"] is None
+
+
+def test_a_log_of_several_vehicles_says_how_long_each_was_heard(tmp_path: Path) -> None:
+    log = recorded(tmp_path / "two.tlog", (0, 60, ROVER, 1), (0, 90, COPTER, 7))
+    done = run("doctor", "-q", str(log))
+    assert done.returncode == 0
+    first, *lines, last = done.stdout.splitlines()
+    assert "2 autopilots were heard: 1.1 for 1 min 0 s, then silent for 30 s until the log ends; 7.1 for" in first
+    assert [line.split()[1] for line in lines if line.startswith("  vehicle")] == ["1.1:", "7.1:"]
+    assert last.startswith(f"next: mav-robot-status {log}")
+
+
+def test_a_log_without_an_autopilot_says_who_was_heard(tmp_path: Path) -> None:
+    log = recorded(tmp_path / "none.tlog", (0, 9, GCS, 255))
+    report = examined("no-autopilot", str(log))
+    says(report, "the log has no heartbeat of an autopilot, only 255.1 GCS", "record where the autopilot is heard")
+    assert not report["ok"]
 
 
 def test_each_connection_has_a_report_and_one_problem_decides_the_exit_code(port: int) -> None:

@@ -17,6 +17,7 @@ import pytest
 import mav_robot_status
 
 from ..deadline import SOON, allow, in_time, wait_until
+from ..ports import free_port
 from .gateway_process import COMMAND, Gateway, run
 from .wire import Wire
 
@@ -76,9 +77,7 @@ def test_a_reader_that_never_reads_stops_neither_mavlink_nor_the_end(
 
 @pytest.mark.parametrize("missing", [">&-", "2>&-", ">&- 2>&- <&-"])
 def test_streams_that_are_closed_at_the_start_do_no_harm(wire: Callable[..., Wire], missing: str) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     process = subprocess.Popen(
         ["/bin/sh", "-c", f'exec "$@" {missing}', "sh", *COMMAND, f"udp:127.0.0.1:{port}"],
         stdout=subprocess.PIPE,
@@ -95,9 +94,7 @@ def test_streams_that_are_closed_at_the_start_do_no_harm(wire: Callable[..., Wir
 def test_standard_error_without_a_reader_does_no_harm(wire: Callable[..., Wire]) -> None:
     read, write = os.pipe()
     os.close(read)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with subprocess.Popen([*COMMAND, f"udp:127.0.0.1:{port}"], stdout=subprocess.PIPE, stderr=write) as process:
         os.close(write)
         wire(("127.0.0.1", port)).beating().wait_for("ROBOT_STATUS")
@@ -182,9 +179,7 @@ def test_version_and_help() -> None:
 def test_quiet_logs_only_warnings_and_verbose_logs_no_less_than_usual(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire]
 ) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     quiet, verbose = gateway(f"udp:127.0.0.1:{port}", "-q"), gateway("udp:127.0.0.1:0", "-v")
     wire(("127.0.0.1", port)).beating()
     wire(verbose.address).beating()

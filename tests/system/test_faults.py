@@ -21,7 +21,8 @@ import pytest
 from mav_robot_status.testing import FakeAutopilot, ardurover
 from tests.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 
-from ..deadline import in_time, wait_until
+from ..deadline import allow, in_time, wait_until
+from ..ports import free_port
 from .bridges import Bridge, PtyBridge, TcpClientBridge, TcpServerBridge
 from .gateway_process import Gateway
 from .wire import Wire
@@ -113,9 +114,7 @@ def test_a_tcp_server_that_is_killed_and_started_again(
 def test_a_tcp_client_that_disconnects_and_reconnects(
     gateway: StartGateway, autopilot: StartAutopilot, bridge: Callable[[Bridge], Bridge]
 ) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     gate = gateway(f"tcpin:127.0.0.1:{port}")
     gate.wait_for_log("listening on")
     goes_on_after_a_cut(gate, bridge(TcpClientBridge(port)), autopilot)
@@ -158,6 +157,7 @@ def test_datagrams_truncated_duplicated_and_out_of_order(gateway: StartGateway, 
     assert gate.stop() == 0
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_a_hundred_megabytes_of_random_bytes(gateway: StartGateway) -> None:
     noise = random.Random(5).randbytes(1 << 20)
     with socket.socket() as server:
@@ -221,7 +221,7 @@ def test_a_flood_from_a_stranger_neither_hides_the_vehicle_nor_makes_it_grow(
             rover.wait_for("ROBOT_STATUS", about_system_1(armed), after=sent)
         wait_until(lambda: count >= FLOOD)
         rover.wait_for("HEARTBEAT", after=time.monotonic())
-        assert gate.memory() - before < GROWTH
+        assert gate.memory() - before < allow(GROWTH)  # a starved gateway reads a full socket buffer at once
     finally:
         stop.set()
         thread.join()

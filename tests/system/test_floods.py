@@ -67,6 +67,7 @@ def flood(to: tuple[str, int], rate: float) -> Iterator[None]:
         thread.join()
 
 
+@pytest.mark.slow
 def test_a_vehicle_gets_a_status_after_forged_heartbeats_have_filled_the_table(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire]
 ) -> None:
@@ -136,6 +137,7 @@ def test_forged_vehicles_do_not_make_the_gateway_flood_a_real_one(
     assert senders(rover) == {1}
 
 
+@pytest.mark.slow
 def test_what_is_sent_unasked_on_one_link_is_bounded_fair_and_counted(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire]
 ) -> None:
@@ -182,6 +184,7 @@ def find_peer(router: Wire) -> tuple[str, int]:
     return found[0]
 
 
+@pytest.mark.slow
 def test_an_out_gets_every_status_of_a_fleet(gateway: Callable[..., Gateway], wire: Callable[..., Wire]) -> None:
     """An out is an order to send: it has no bound of its own."""
     station = wire()
@@ -221,6 +224,7 @@ def tcp_vehicle(port: int, stop: threading.Event) -> None:
         stop.wait(0.3)
 
 
+@pytest.mark.slow
 def test_a_gateway_without_free_descriptors_logs_one_line_and_rests(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire]
 ) -> None:

@@ -26,6 +26,7 @@ from tests.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 
 from ..deadline import allow
 from ..docs.documents import ROOT, blocks
+from ..ports import free_port
 from .gateway_process import Gateway, run
 from .terminal import Terminal
 from .wire import Wire
@@ -43,12 +44,6 @@ def shown(first: str) -> str:
     """The block of the page that starts like this."""
     (code,) = (b.code for b in blocks("text") if b.document.name == "ground-stations.md" and b.code.startswith(first))
     return code
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_port:
-        any_port.bind(("127.0.0.1", 0))
-        return int(any_port.getsockname()[1])
 
 
 # -- MAVProxy --------------------------------------------------------------------------------------------------------

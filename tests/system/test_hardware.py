@@ -19,6 +19,7 @@ import pytest
 from mav_robot_status.testing import FakeAutopilot, ardurover
 
 from ..deadline import SOON, allow, in_time, wait_until
+from ..ports import free_port
 from .gateway_process import Gateway, run
 from .mqtt_broker import MISSING, Broker, Listener
 from .wire import Wire
@@ -73,9 +74,7 @@ class Arm:
     """A robot that sends its line to a port."""
 
     def __init__(self) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-            free.bind(("127.0.0.1", 0))
-            self.port: int = free.getsockname()[1]
+        self.port = free_port()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
     def say(self, line: str = "mode=auto powered=1 moving=0 stopped=0") -> float:

@@ -87,6 +87,7 @@ def test_a_pipe_without_a_writer_is_one_line(tmp_path: Path) -> None:
     is_one_clear_line(run(str(pipe)), "nothing was written to it")
 
 
+@pytest.mark.slow
 def test_a_file_larger_than_the_memory_is_read_in_pieces(tmp_path: Path) -> None:
     log = tmp_path / "large.tlog"
     mav = MAVLink(None, srcSystem=1, srcComponent=1)

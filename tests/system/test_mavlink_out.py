@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import shutil
-import socket
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -20,6 +19,7 @@ from mav_robot_status.testing import FakeAutopilot, arducopter, ardurover
 from tests.pymavlink_dialect import MAVLink, MAVLink_heartbeat_message
 
 from ..deadline import in_time, wait_until
+from ..ports import free_port
 from .gateway_process import Gateway
 from .wire import Heard, Wire
 
@@ -211,9 +211,7 @@ def test_we_take_the_next_component_id_if_another_program_has_ours_but_not_for_a
 def test_a_port_that_refuses_does_not_stop_the_gateway(
     gateway: Callable[..., Gateway], wire: Callable[..., Wire]
 ) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as nobody:
-        nobody.bind(("127.0.0.1", 0))
-        port = nobody.getsockname()[1]
+    port = free_port()
     gate = gateway("udpin:127.0.0.1:0", "--out", f"127.0.0.1:{port}")
     rover = wire(gate.address).beating()
     gate.wait_for(lambda s: s["seq"] > 5)

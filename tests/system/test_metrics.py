@@ -7,7 +7,6 @@ import os
 import pathlib
 import re
 import shutil
-import socket
 import subprocess
 import time
 import urllib.error
@@ -23,6 +22,7 @@ from mav_robot_status.publishers.metrics import CONNECTION, CONTENT_TYPE, GATEWA
 from tests.pymavlink_dialect import MAVLink_statustext_message
 
 from ..deadline import SOON, Deadline, allow, in_time
+from ..ports import free_port
 from .gateway_process import Gateway
 from .wire import Wire
 
@@ -195,9 +195,7 @@ class Prometheus:
         config = config.replace("127.0.0.1:8765", target).replace("scrape_interval: 5s", "scrape_interval: 500ms")
         (folder / "prometheus.yml").write_text("global: {evaluation_interval: 500ms}\n" + config)
         shutil.copy(CONTRIB / "prometheus" / "alerts.yml", folder)
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.address = f"127.0.0.1:{free.getsockname()[1]}"
+        self.address = f"127.0.0.1:{free_port()}"
         command = [PROMETHEUS, "--config.file=prometheus.yml", f"--storage.tsdb.path={folder / 'data'}"]
         with (folder / "log").open("wb") as log:
             self.process = subprocess.Popen(

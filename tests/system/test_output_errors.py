@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import resource
 import signal
-import socket
 import subprocess
 import time
 from collections.abc import Callable
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..deadline import SOON, allow, wait_until
+from ..ports import free_port
 from .gateway_process import COMMAND, Gateway
 from .wire import Wire
 
@@ -79,9 +79,7 @@ def test_a_full_disk_does_not_end_the_gateway(gateway: StartGateway, wire: OpenW
 
 
 def test_standard_output_on_a_full_disk_does_not_end_the_gateway(wire: OpenWire) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with (
         Path("/dev/full").open("wb") as full,
         subprocess.Popen([*COMMAND, f"udp:127.0.0.1:{port}"], stdout=full, stderr=subprocess.PIPE) as process,

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from mav_robot_status.testing import DEMO
 
@@ -127,3 +129,40 @@ def test_a_file_that_is_not_a_log_is_one_line_and_exit_code_2(tmp_path: Path) ->
     assert (done.returncode, done.stdout) == (2, "")
     assert "is not a recorded log" in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
+
+
+MEASURED = (
+    "import sys; from mav_robot_status.cli import main; code = main(sys.argv[1:])\n"
+    "print(next(line for line in open('/proc/self/status') if line.startswith('VmHWM')), file=sys.stderr)\n"
+    "sys.exit(code)"
+)
+"""Runs the command, and then prints the most memory that it has ever had."""
+
+
+@pytest.fixture(scope="module")
+def large_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """80 MB: the demo, and much that no status needs."""
+    path = tmp_path_factory.mktemp("logs") / "large.tlog"
+    mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    with path.open("wb") as log:
+        for at in range(600):
+            log.write(
+                stamped(at, dialect.MAVLink_heartbeat_message(2, 3, 81 + 128 * (at // 60 % 2), 0, 3, 3).pack(mav))
+            )
+            image = dialect.MAVLink_encapsulated_data_message(at, [at % 255 + 1] * 253).pack(mav)
+            log.write(stamped(at, image) * 500)
+    assert path.stat().st_size > 80e6
+    return path
+
+
+def stamped(second: int, frame: bytes) -> bytes:
+    return (1_800_000_000_000_000 + second * 1_000_000).to_bytes(8, "big") + frame
+
+
+@pytest.mark.parametrize("arguments", [("--json", "none"), ("report", "--as-json")], ids=["replay", "report"])
+def test_the_memory_does_not_depend_on_the_size_of_the_log(large_log: Path, arguments: tuple[str, ...]) -> None:
+    command = [sys.executable, "-c", MEASURED, *arguments, str(large_log)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=allow(60))
+    assert done.returncode == 0, done.stderr
+    kilobytes = int(done.stderr.split("VmHWM:")[1].split()[0])
+    assert kilobytes < 60_000

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from mav_robot_status.language import LOOKS, TONES
 from mav_robot_status.mavlink.definitions import Heartbeat, Statustext
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.views.timeline import TRACKS
@@ -210,10 +211,58 @@ def test_a_browser_draws_a_row_for_each_field_and_reason(
     shown = opened(page)
     reasons = len(found["totals"]["errors"]) + len(found["totals"]["inhibits"])
     assert shown.count('aria-roledescription="timeline"') == len(TRACKS) + reasons
-    for kind in ("unknown", "lost", "alarm", "stop", "off", "on"):
+    for kind in ("hatched unknown", "full warning", "full alarm", "line calm", "full active", "half calm"):
         assert f'<rect class="{kind}"' in shown, kind
-    for words in ("2001 RC_LOST", "Crash: Going to HOLD", "TRUE, cycle 1", "in_error: FALSE → TRUE", "LINK_STALE ends"):
+    for words in ("2001 RC_LOST", "Crash: Going to HOLD", "YES, cycle 1", "○ none → ▲ ERROR", "LINK_STALE ends"):
         assert words in shown, words
+
+
+def test_the_legend_has_the_words_and_shapes_of_the_one_table(
+    tmp_path: Path, demo_log: Path, opened: Callable[[Path], str]
+) -> None:
+    page = tmp_path / "demo.html"
+    run("report", "-q", str(demo_log), "-o", str(page))
+    shown = opened(page)
+    for field, looks in LOOKS.items():
+        (row,) = re.findall(rf'<li data-field="{field}">(.*?)</li>', shown)
+        found = re.findall(r'data-value="(\w+)">.*?<rect class="(\w+) (\w+)".*?</svg>(.*?)</span>', row)
+        words = {True: "TRUE", False: "FALSE", None: "UNKNOWN"}
+        assert found == [
+            (words.get(value, value), look.bar, look.tone, f"{look.glyph} {look.word}") for value, look in looks.items()
+        ], field
+    for name, tone in TONES.items():
+        assert shown.count(f"--{name}: {tone.light};") == shown.count(f"--{name}: {tone.dark};") == 1
+
+
+def test_the_page_opens_on_the_time_in_which_the_vehicle_was_heard(
+    tmp_path: Path, opened: Callable[[Path], str]
+) -> None:
+    log, page = tmp_path / "quiet.tlog", tmp_path / "quiet.html"
+    station = [(30.0 * n, Heartbeat(0, 6, 8, 192, 4, 3)) for n in range(4, 61)]
+    log.write_bytes(beats(*heartbeats(0, 100)) + beats(*station, system=255))
+    run("report", "-q", str(log), "-o", str(page))
+    shown = opened(page)
+    assert re.search(r"<output>1 min 4\d s of 30 min 00 s</output>", shown)
+    assert "When heard" in shown
+    assert re.search(r"Time in each state, of 1 min 4\d s of linked time", shown)
+    assert re.search(r"The link, of 30 min 00 s since the first heartbeat", shown)
+
+
+def test_a_lost_link_is_no_reason_for_standing_still_and_no_end_of_an_error(
+    tmp_path: Path, opened: Callable[[Path], str]
+) -> None:
+    log, page = tmp_path / "loss.tlog", tmp_path / "loss.html"
+    armed = heartbeats(0, 10, base_mode=193)
+    log.write_bytes(
+        beats(*armed[:10], (5.0, Statustext(0, b"Crash: Disarming", 0, 0)), *armed[11:], (30.0, armed[0][1]))
+    )
+    run("report", "-q", str(log), "-o", str(page))
+    shown = opened(page)
+    assert "CRASH: unknown while the link is lost" in shown
+    assert "CRASH ends" not in shown
+    headings = re.findall(r'<div class="group">(.*?)</div>', shown)
+    assert headings[-1] == "Why this is unknown"
+    assert "LINK_STALE" in shown.partition("Why this is unknown")[2]
 
 
 def test_a_browser_executes_nothing_from_the_wire(tmp_path: Path, opened: Callable[[Path], str]) -> None:
@@ -239,4 +288,5 @@ def test_the_document_has_the_members_and_the_totals() -> None:
     (log,) = re.findall(r"`(tests/recorded/logs/\S+\.tlog)`", text)
     (found,) = reported(str(ROOT / log))
     assert json.loads(text.partition("```text\n")[2].partition("```")[0]) == found["totals"]
-    assert [row[0] for row in table("docs/reference/report.md", "member")] == list(found)
+    rows = [row[0] for row in table("docs/reference/report.md", "member")]
+    assert [row for row in rows if row != "members"] == list(found), "a single robot has no members"

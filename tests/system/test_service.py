@@ -20,6 +20,7 @@ import pytest
 from tests.pymavlink_dialect import MAVLink_statustext_message
 
 from ..deadline import SOON, allow, wait_until
+from ..ports import free_port
 from .gateway_process import Gateway, run
 from .wire import Wire
 
@@ -74,7 +75,7 @@ def test_the_unit_matches_the_program() -> None:
     assert found["ExecReload"] == "/bin/kill -HUP $MAINPID"
     assert found["RestartPreventExitStatus"] == "2"
     assert (found["DynamicUser"], found["SupplementaryGroups"]) == ("yes", "dialout")
-    assert found["StateDirectory"] == "mav-robot-status"
+    assert (found["StateDirectory"], found["CacheDirectory"]) == ("mav-robot-status", "mav-robot-status")
     assert int(found["WatchdogSec"]) > 0
 
 
@@ -191,15 +192,14 @@ def service(gateway: StartGateway, tmp_path: pathlib.Path) -> Callable[..., Serv
 
 
 @contextlib.contextmanager
-def free_port() -> Iterator[socket.socket]:
+def taken_port() -> Iterator[socket.socket]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         yield taken
 
 
 def any_port() -> int:
-    with free_port() as found:
-        return int(found.getsockname()[1])
+    return free_port()
 
 
 def is_free(port: int) -> bool:
@@ -301,7 +301,7 @@ def test_an_invalid_file_changes_nothing_and_is_one_line_in_the_log(
     it = service(f"links: ['udpin:127.0.0.1:{port}']\n")
     wire(("127.0.0.1", port)).beating()
     it.gate.wait_for(lambda s: s["link"]["state"] == "CONNECTED")
-    with free_port() as taken:
+    with taken_port() as taken:
         names = {"port": port, "other": other, "taken": taken.getsockname()[1]}
         sent = it.reload(text.format(**names), "the configuration stays as it was")
         it.gate.wait_for_log("stays as it was: .*" + says.format(**names))
@@ -375,6 +375,7 @@ def documented(wheel: pathlib.Path, folder: pathlib.Path) -> str:
     return re.sub(r"\./mav_robot_status-\S+\.whl", str(wheel), commands)
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_document_install_the_service(wheel: pathlib.Path, tmp_path: pathlib.Path) -> None:
     if not shutil.which("pipx", path=INSTALLERS):
         pytest.skip("pipx is not installed: .ci/run installs it in build/installers")
@@ -411,3 +412,4 @@ def test_the_wheel_installs_the_command_and_the_files_of_the_service(
     files = {path.name for path in (tmp_path / "tools").rglob("share/mav-robot-status/**/*") if path.is_file()}
     there_are = {path.name for path in (ROOT / "contrib").rglob("*") if path.is_file()}
     assert files == there_are
+    assert len(list((tmp_path / "tools").rglob("share/man/man1/mav-robot-status.1"))) == 1

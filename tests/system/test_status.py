@@ -143,7 +143,19 @@ def test_two_vehicles_on_one_port_have_two_handles(gateway: Callable[..., Gatewa
     second = gate.wait_for(lambda s: s["system"] == 9)
     assert second.status["handle"] == f"{HANDLE}/9.1"
     assert second.status["seq"] == 0
-    assert {line.status["handle"] for line in gate.lines if line.status["system"] == 7} == {HANDLE}
+    assert {line.status["handle"] for line in gate.lines if line.status["system"] == 7} == {f"{HANDLE}/7.1"}
+
+
+def test_vehicle_1_1_has_the_plain_handle_although_a_forger_was_heard_first(
+    gateway: Callable[..., Gateway], wire: Callable[..., Wire]
+) -> None:
+    gate = gateway("udpin:127.0.0.1:0")
+    wire(gate.address, system=66).beat()
+    forged = gate.wait_for(lambda s: s["system"] == 66)
+    assert forged.status["handle"] == f"{HANDLE}/66.1"
+    wire(gate.address).beat()
+    assert gate.wait_for(lambda s: s["system"] == 1).status["handle"] == HANDLE
+    assert {line.status["system"] for line in gate.lines if line.status["handle"] == HANDLE} == {1}
 
 
 def test_the_chosen_system_has_lines_from_the_start_and_others_are_ignored(
@@ -153,11 +165,27 @@ def test_the_chosen_system_has_lines_from_the_start_and_others_are_ignored(
     first = gate.wait_for(lambda s: True)
     assert first.status["link"] == {"state": "NEVER_SEEN", "heartbeat_age": None}
     assert (first.status["system"], first.status["component"]) == (5, None)
+    assert first.status["handle"] == HANDLE
     validate(first.status)
     wire(gate.address, system=4).beat()
     wire(gate.address, system=5).beat()
     gate.wait_for(lambda s: s["link"]["state"] == "CONNECTED")
     assert {line.status["system"] for line in gate.lines} == {5}
+
+
+def test_a_named_vehicle_has_its_name_in_each_line_and_others_are_served_too(
+    gateway: Callable[..., Gateway], wire: Callable[..., Wire], validate: Callable[[Any], None], tmp_path: Path
+) -> None:
+    config = tmp_path / "names.yaml"
+    config.write_text("vehicles: [{system: 1, name: Rover-A}]")
+    gate = gateway("udpin:127.0.0.1:0", "--config", str(config), "--name", "2.1=Boot Süd")
+    for system in (1, 2, 3):
+        wire(gate.address, system=system).beat()
+    lines = [gate.wait_for(lambda s, system=system: s["system"] == system) for system in (1, 2, 3)]  # type: ignore[misc]
+    assert [line.status["vehicle"].get("name") for line in lines] == ["Rover-A", "Boot Süd", None]
+    assert "name" not in lines[2].status["vehicle"]
+    for line in lines:
+        validate(line.status)
 
 
 def test_a_configuration_with_two_vehicles_and_two_controllers_on_a_handle(

@@ -135,6 +135,7 @@ def test_the_event_of_a_failsafe_ends_with_it(tmp_path: Path) -> None:
     assert [found for seconds, found in at.items() if 19.2 < seconds < 24 and found] == []
 
 
+@pytest.mark.slow
 def test_packets_that_a_tunnel_repeats_are_not_a_reboot(
     gateway: Callable[..., Gateway], autopilot: Callable[..., FakeAutopilot]
 ) -> None:
@@ -158,6 +159,7 @@ def test_packets_repeated_in_a_log_are_not_a_reboot(tmp_path: Path) -> None:
     assert {line["error_code"] for line in lines if 12.2 < float(line["stamp"][17:-1]) < 39} == {4001}
 
 
+@pytest.mark.slow
 def test_the_version_of_the_firmware_is_asked_for_and_shown(
     gateway: Callable[..., Gateway], autopilot: Callable[..., FakeAutopilot], validate: Callable[[Any], None]
 ) -> None:

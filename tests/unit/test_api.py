@@ -4,7 +4,6 @@ import asyncio
 import gc
 import json
 import pathlib
-import socket
 import subprocess
 import sys
 import threading
@@ -14,20 +13,20 @@ import pytest
 
 import mav_robot_status
 from mav_robot_status import LinkState, RobotMode, RobotStatus, Statuses, TriState, statuses
-from mav_robot_status.config import Config, LinkConfig
+from mav_robot_status.config import Config, GroupConfig, HardwareConfig, LinkConfig, VehicleConfig
 from mav_robot_status.errors import ConfigError, LinkError, UsageError
 from mav_robot_status.testing import FakeAutopilot, ardurover
+from mav_robot_status.testing.fake_arm import FakeArm
 
 from ..deadline import allow, wait_until
+from ..ports import free_port
 
 LOG = pathlib.Path(__file__).parents[1] / "recorded" / "logs" / "ardurover-4.5.6-auto.tlog"
 
 
 @pytest.fixture
 def port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
+    return free_port()
 
 
 @pytest.fixture
@@ -68,6 +67,24 @@ def test_a_configuration_file_gives_links_and_handles(tmp_path: pathlib.Path) ->
     assert {msg.handle for msg in statuses(config=Config(links=(LinkConfig(str(LOG)),)))} == {
         "industrial_robot_status_handle"
     }
+
+
+def test_a_group_yields_messages_beside_those_of_its_members(port: int) -> None:
+    members = ("base", "arm")
+    with FakeArm() as arm, FakeAutopilot(ardurover.READY, ("127.0.0.1", port)):
+        ports = {"port": arm.port, "dashboard_port": arm.dashboard_port}
+        config = Config(
+            links=(LinkConfig(f"udpin:127.0.0.1:{port}"),),
+            vehicles=(VehicleConfig(handle="base"),),
+            interfaces=(HardwareConfig("ur", "arm", {"host": "127.0.0.1", **ports}),),
+            groups={"robot": GroupConfig(members)},
+        )
+        with statuses(config=config) as found:
+            of_group = next(m for m in found if m.handle == "robot" and m.status.drives_powered is TriState.TRUE)
+            heard = {next(found).handle for _ in range(30)}
+    assert heard == {"robot", *members}
+    assert of_group.detail.members == members
+    assert of_group.status.motion_possible is not TriState.TRUE  # the base is disarmed
 
 
 def test_configured_publishers_run_too(tmp_path: pathlib.Path) -> None:

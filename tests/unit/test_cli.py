@@ -11,8 +11,21 @@ from mav_robot_status import __version__
 from mav_robot_status.cli import main
 from mav_robot_status.commands import COMMANDS
 
-LATER = {"yaml", "aiohttp", "paho", "rich", "serial", "pymavlink"}
+LATER = {"yaml", "aiohttp", "paho", "textual", "serial", "pymavlink"}
 """Modules that a run imports only for an option that needs them."""
+RARE = {
+    "asyncio",
+    "bz2",
+    "difflib",
+    "encodings.idna",
+    "hashlib",
+    "hmac",
+    "importlib.metadata",
+    "lzma",
+    "pathlib",
+    "ssl",
+}
+"""Modules of the standard library that are slow or large, and that a live gateway on UDP does not need."""
 
 
 @pytest.fixture(autouse=True)
@@ -53,6 +66,18 @@ def test_the_help_has_a_line_for_every_command(capsys: pytest.CaptureFixture[str
     assert [name for name in COMMANDS if any(line.split()[:1] == [name] for line in lines)] == list(COMMANDS)
 
 
+def test_a_live_gateway_imports_nothing_that_few_need() -> None:
+    script = (
+        "import sys; from mav_robot_status.cli import main; from mav_robot_status.gateway.event_loop import EventLoop\n"
+        "EventLoop.run = lambda self: None\n"
+        "assert main(['udpin:127.0.0.1:0', '-q']) == 0; print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, check=True)
+    modules = set(done.stdout.split())
+    assert "mav_robot_status.links.udp" in modules
+    assert not modules & (LATER | RARE)
+
+
 def test_a_run_imports_no_other_command() -> None:
     script = (
         "import sys; from mav_robot_status.cli import main; "
@@ -63,7 +88,6 @@ def test_a_run_imports_no_other_command() -> None:
     assert "mav_robot_status.gateway.replay" in modules
     assert not modules & LATER
     assert not any(name.startswith("mav_robot_status.views") for name in modules)
-    web = "mav_robot_status.publishers.web"
-    assert {name for name in modules if name.startswith(web)} == {web, f"{web}.options"}  # its command line arguments
+    assert not any(name.startswith("mav_robot_status.publishers.web") for name in modules)
     commands = {name.rpartition(".")[2] for name in modules if name.startswith("mav_robot_status.commands.")}
-    assert commands == {"run", "options", "overrides"}
+    assert commands == {"run", "arms", "options", "overrides"}

@@ -7,13 +7,16 @@ Betaflight's command lines.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
+from ...clock import rfc3339
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_ARDUPILOTMEGA, MAV_AUTOPILOT_PX4
+from ...values import NamedTuple
 from ..applet import PAGE, WORDS
 from .findings import HEARTBEAT
+from .heard import duration
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -125,10 +128,55 @@ def use_mavlink_2(vehicle: Speaker) -> str:
     return _MAVLINK_2.get(vehicle.autopilot or 0, "set the autopilot to MAVLink 2")
 
 
+def behind_satellite(f: Findings) -> str:
+    """The advice for a vehicle that sends only HIGH_LATENCY2."""
+    if f.url.kind.is_log:
+        return run(f)
+    return f"{run(f)}; if the link is not a satellite, let the autopilot send HEARTBEAT there"
+
+
 def run(f: Findings) -> str:
     """The command that publishes the statuses, and how to know more."""
     command = f"mav-robot-status {f.url.text}" + (" --passive" if f.passive and not f.url.kind.is_log else "")
     return command + (APPLET_ADVICE if any(s.needs_applet for s in f.vehicles) else "")
+
+
+def available(f: Findings) -> str:
+    """That a status is available; of a log that ends in silence, when its vehicles were heard."""
+    if not any(s.silent for s in f.vehicles):
+        return "a status is available"
+    first, *others = f.vehicles
+    if first.silent and not others:
+        silence = duration(first.silent.silence)
+        return f"the autopilot {first.ids} was heard for {first.silent.words}; the log ends {silence} later in silence"
+    told = (f"{s.ids} for {s.heard.words}, {_end(s.heard.silence)}" for s in f.vehicles if s.heard)
+    return f"{len(f.vehicles)} autopilots were heard: {'; '.join(told)}"
+
+
+def _end(silence: float) -> str:
+    return f"then silent for {duration(silence)} until the log ends" if silence else "until the log ends"
+
+
+def look(f: Findings) -> str:
+    """The next command for a connection without a fault: of a log that ends in silence, the last status."""
+    last = max((s.silent.until_us for s in f.vehicles if s.silent), default=None)
+    if last is None or not all(s.silent for s in f.vehicles):
+        return run(f)
+    return f"mav-robot-status explain {f.url.text} --at {rfc3339(last)}"
+
+
+def others_only(f: Findings) -> str:
+    """That no autopilot is heard, but somebody else."""
+    if f.url.kind.is_log:
+        return f"the log has no heartbeat of an autopilot, only {named_all(f.speakers)}"
+    return f"no autopilot is heard, only {named_all(f.speakers)}"
+
+
+def forward(f: Findings) -> str:
+    """The advice for a connection without an autopilot."""
+    if f.url.kind.is_log:
+        return "record where the autopilot is heard: mav-robot-status CONNECTION --record FILE.tlog"
+    return "let the router forward the autopilot's messages here, at least HEARTBEAT"
 
 
 def applet_heard(vehicle: Speaker) -> Iterator[str]:

@@ -10,6 +10,7 @@ from ...hardware.mavlink.identity import is_autopilot, named
 from ...hardware.mavlink.state.applet import is_word, value_of
 from ...hardware.mavlink.state.boot_clock import APART
 from ...hardware.mavlink.state.claims import CLOCKS
+from ...hardware.mavlink.state.high_latency import stated
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
 from ...mavlink.counters import count as add
@@ -140,6 +141,8 @@ class _Component:
         self._times[frame.message_id] = number + 1, first, now.mono
         if frame.message_id == HEARTBEAT:
             self._note_heartbeat(frame.message, frame.ids[1])
+        elif type(frame.message) is mav.HighLatency2:
+            self._note_heartbeat(stated(frame.message), frame.ids[1])
         elif type(frame.message) is mav.NamedValueFloat:
             value = value_of(frame.message) if is_word(frame.message) else None
             if value is not None:

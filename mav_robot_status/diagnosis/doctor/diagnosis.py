@@ -6,20 +6,26 @@ The first case that applies is the diagnosis. A fault that hides other faults co
 from __future__ import annotations
 
 import errno
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
+
+from mav_robot_status.values import NamedTuple
 
 from .advice import (
     OTHER_SYSTEM,
+    available,
+    behind_satellite,
+    forward,
     heartbeats,
     let_send,
     listed,
+    look,
     missing_heartbeats,
     named_all,
     other_rate,
+    others_only,
     own,
     pick_device,
     protocol,
-    run,
     stream_sys_status,
     use_mavlink_2,
 )
@@ -106,11 +112,15 @@ def _conflicting(f: Findings) -> tuple[Speaker, ...]:
 
 
 def _seldom(f: Findings) -> tuple[Speaker, ...]:
-    return tuple(s for s in f.vehicles if heartbeats(s) < LEAST_HEARTBEATS)
+    return tuple(s for s in f.vehicles if heartbeats(s) < LEAST_HEARTBEATS and not s.seldom)
 
 
 def _without_sys_status(f: Findings) -> tuple[Speaker, ...]:
-    return tuple(s for s in f.vehicles if SYS_STATUS not in s.counts)
+    return tuple(s for s in f.vehicles if SYS_STATUS not in s.counts and not s.seldom)
+
+
+def _by_high_latency(f: Findings) -> tuple[Speaker, ...]:
+    return tuple(s for s in f.vehicles if s.seldom)
 
 
 def _old(f: Findings) -> tuple[Speaker, ...]:
@@ -207,8 +217,7 @@ CASES: Final = (
          lambda f: "let the sender use MAVLink's definitions of these messages"),
     Case("no-autopilot", "MAVLink arrives, but no heartbeat of an autopilot: only ground stations, cameras, ...",
          lambda f: not _pilots(f),
-         lambda f: f"no autopilot is heard, only {named_all(f.speakers)}",
-         lambda f: "let the router forward the autopilot's messages here, at least HEARTBEAT"),
+         others_only, forward),
     Case("not-believed", "an autopilot is heard, but its frames are not signed with the given key",
          lambda f: f.signing and not f.vehicles,
          lambda f: f"{named_all(_pilots(f))} is not accepted: "
@@ -238,6 +247,11 @@ CASES: Final = (
          + (", although it was requested" if f.asked else "; it was not requested"),
          lambda f: stream_sys_status(f, _without_sys_status(f)[0])),
     # a status is available
+    Case("high-latency", "the vehicle sends only HIGH_LATENCY2, as behind a satellite",
+         _by_high_latency,
+         lambda f: f"a status is available, but {_by_high_latency(f)[0].ids} is heard by HIGH_LATENCY2 only: e_stopped "
+         "and rest are never known, armed only of an ArduPilot, and the status is as old as link.heartbeat_age",
+         behind_satellite),
     Case("mavlink-1", "the vehicle uses MAVLink 1: no extension fields, and no message ids over 255",
          _old,
          lambda f: f"a status is available, but {_old(f)[0].ids} uses MAVLink 1: no extension fields, no ROBOT_STATUS",
@@ -248,6 +262,6 @@ CASES: Final = (
          f"lines, differ by {abs(_off(f)[0].clock_off or 0):.0f} s",
          lambda f: "set this computer's clock (timedatectl set-ntp true), unless it is the vehicle's that is wrong"),
     Case("ok", "a status is available",
-         lambda f: True, lambda f: "a status is available", run),
+         lambda f: True, available, look),
 )  # fmt: skip
 """In the order of evaluation. The last one always applies."""

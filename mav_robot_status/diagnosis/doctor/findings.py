@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ...hardware.mavlink.identity import named
 from ...hardware.mavlink.state.applet import FRESH
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
+from ...values import NamedTuple
+from .heard import Heard
 
 if TYPE_CHECKING:
     from ...hardware.mavlink.autopilots.wanted import Wanted
     from ...links.url import Url
 
-HEARTBEAT, SYS_STATUS = 0, 1
+HEARTBEAT, SYS_STATUS, HIGH_LATENCY2 = 0, 1, 235
 GROUND_STATION: Final = 6  # MAV_TYPE
 SAME_ID: Final = 3
 """Bad frames of an id, without a good one, from which on its definition is suspected instead of noise."""
@@ -76,6 +78,10 @@ class VehicleStatus(NamedTuple):
     """The messages that the status of this vehicle needs."""
     firmware: str | None = None
     """The version of its firmware."""
+    costly: bool = False
+    """Whether it is heard by HIGH_LATENCY2 alone."""
+    name: str | None = None
+    """What people call it."""
     can_run_applet: bool = False
     """Whether its autopilot is ArduPilot, which can run the applet."""
 
@@ -105,6 +111,8 @@ class Speaker(NamedTuple):
     """None if the applet was not heard."""
     status: VehicleStatus | None = None
     """None if it has no handle."""
+    heard: Heard | None = None
+    """When it was heard, in a log; None on a live connection, and without a handle."""
 
     @property
     def ids(self) -> str:
@@ -120,6 +128,8 @@ class Speaker(NamedTuple):
     @property
     def wanted(self) -> dict[str, float | None]:
         """Hz by name, for its heartbeat and the messages that a status needs. None: received once. 0: never."""
+        if self.seldom:
+            return {mav.MESSAGES[HIGH_LATENCY2].name: self.rates.get(HIGH_LATENCY2)}
         needed: list[tuple[int, ...]] = [(HEARTBEAT,)]
         for one in self.status.wanted if self.status else ():
             needed.append((one.id,) if one.instead is None else (one.id, one.instead))
@@ -131,12 +141,22 @@ class Speaker(NamedTuple):
         return wanted
 
     @property
+    def seldom(self) -> bool:
+        """Whether it is a vehicle that is heard by HIGH_LATENCY2 alone."""
+        return self.status is not None and self.status.costly
+
+    @property
     def needs_applet(self) -> bool:
         """Whether the applet is not heard, and would make a known `e_stopped` of an unknown one."""
         status = self.status
         if status is None or not status.can_run_applet or (self.applet is not None and self.applet.fresh):
             return False
-        return status.fields.get("e_stopped") is None
+        return (self.silent.last if self.silent else status).fields.get("e_stopped") is None
+
+    @property
+    def silent(self) -> Heard | None:
+        """When it was heard, if the log ends in its silence."""
+        return self.heard if self.heard is not None and self.heard.silence else None
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -166,6 +186,8 @@ class Findings:
     """Frames with a good CRC by id."""
     dropped: int = 0
     """Messages that could not be sent, and datagrams that the kernel dropped."""
+    kernel_filter: bool | None = None
+    """Whether a gateway with this configuration filters this link in the kernel. None: not a UDP link."""
     sources: tuple[str, ...] = ()
     """Source addresses, on links that can have several peers."""
     speakers: tuple[Speaker, ...] = ()
@@ -183,7 +205,8 @@ class Findings:
     def able(self) -> bool:
         """Whether every vehicle sends enough for a status."""
         return bool(self.vehicles) and all(
-            s.counts.get(HEARTBEAT, 0) >= LEAST_HEARTBEATS and SYS_STATUS in s.counts for s in self.vehicles
+            s.seldom or (s.counts.get(HEARTBEAT, 0) >= LEAST_HEARTBEATS and SYS_STATUS in s.counts)
+            for s in self.vehicles
         )
 
     @property

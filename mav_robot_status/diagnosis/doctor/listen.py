@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 from ...clock import now as present
 from ...errors import LinkError
 from ...gateway.event_loop import EventLoop
+from ...gateway.kernel_filter import why_not
 from ...gateway.recorded_log import Recording
 from ...gateway.replay import ReplayPipeline, run_through
 from ...hardware.mavlink.autopilots.wanted import COMMON
@@ -29,6 +30,7 @@ from .advice import protocol
 from .collector import Collector
 from .diagnosis import diagnose
 from .findings import Findings, Trouble, VehicleStatus
+from .heard import Listener
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -52,6 +54,7 @@ def examine(
     config: Config, link: LinkConfig, seconds: float = LISTEN, clock: Callable[[], Instant] = present
 ) -> tuple[Findings, Diagnosis]:
     """Listen on one of the links. Raises UsageError for a log that cannot be read."""
+    filters = why_not(config) is None
     config = dataclasses.replace(silent(config), links=(link,), outs=(), interfaces=(), record=None, forward=False)
     url = parse(link.url)
     base = Findings(
@@ -60,6 +63,7 @@ def examine(
         link.passive,
         signing=config.signing is not None,
         expected=tuple(v.system for v in config.vehicles if v.system is not None),
+        kernel_filter=filters if url.kind.transport == "udp" else None,
     )
     findings = _read(config, base) if url.kind.is_log else _listen(config, base, seconds, clock)
     return findings, diagnose(findings)
@@ -150,11 +154,17 @@ def _read(config: Config, base: Findings) -> Findings:
     """Read a log to its end. Raises UsageError."""
     recording = _Whole(base.url.device)
     collector = Collector()
-    pipeline = ReplayPipeline(config, NO_OUTPUT)
+    listener = Listener()
+    pipeline = ReplayPipeline(config, NO_OUTPUT, observers=[listener])
     last = run_through(pipeline, recording.wanted_frames(collector))  # the first record is at 0
     known = dataclasses.replace(base, seconds=round(last.mono, 1))
     found = collector.findings(known, _statuses(pipeline.vehicles, last), recording.counters())
-    return dataclasses.replace(found, size=os.path.getsize(base.url.device))
+    handles = {tracked.ids: tracked.handle for tracked in pipeline.vehicles.vehicles}
+    speakers = (
+        s._replace(heard=listener.heard(handles[s.system, s.component], last)) if s.status else s
+        for s in found.speakers
+    )
+    return dataclasses.replace(found, size=os.path.getsize(base.url.device), speakers=tuple(speakers))
 
 
 # -- the vehicles ------------------------------------------------------------------------------------------------------
@@ -174,8 +184,10 @@ def _status(hw: MavlinkRobotHW, tracked: TrackedVehicle, now: Instant) -> Vehicl
         explained["vehicle"]["flight_mode"],
         {name: field["value"] for name, field in explained["fields"].items()},
         tuple(error["name"] for error in explained["errors"]),
-        tuple(inhibit["name"] for inhibit in explained["inhibits"]),
+        tuple(dict.fromkeys(inhibit["name"] for inhibit in explained["inhibits"])),
         wanted,
         explained["vehicle"].get("firmware"),
-        can_run_applet=applet.can_run(state),
+        costly=tracked.costly,
+        name=tracked.name,
+        can_run_applet=applet.can_run(state) and not tracked.costly,
     )

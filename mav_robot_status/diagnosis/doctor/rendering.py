@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from ...clock import rfc3339
 from ...hardware.mavlink.identity import named
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_PX4
 from .advice import applet_heard, listed, named_all
 from .findings import GROUND_STATION
+from .heard import duration
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from .diagnosis import Diagnosis
     from .findings import Findings, Speaker
+    from .heard import Heard
 
 FEW_SOURCES = 4
 """Limit of addresses in the text. The JSON has all."""
@@ -53,6 +56,7 @@ def as_json(f: Findings, diagnosis: Diagnosis) -> str:
             "incompatible": c.incompatible,
             "garbage_bytes": c.garbage_bytes,
             "dropped": f.dropped,
+            "kernel_filter": f.kernel_filter,
             "sources": f.sources,
             "speakers": [_speaker(s) for s in f.speakers],
         }
@@ -68,7 +72,7 @@ def remarks(f: Findings) -> Iterator[str]:
     others = tuple(s for s in f.speakers if s.status is None)
     if others:
         yield f"also heard: {named_all(others)}"
-    if any(s.autopilot == MAV_AUTOPILOT_PX4 for s in f.vehicles) and not any(
+    if any(s.autopilot == MAV_AUTOPILOT_PX4 and not s.seldom for s in f.vehicles) and not any(
         s.type == GROUND_STATION for s in f.speakers
     ):
         yield "no ground station is heard here: PX4 sends texts only to one, so causes have no text"
@@ -89,21 +93,29 @@ def _traffic(f: Findings) -> Iterator[str]:
         yield f"{c.garbage_bytes} bytes between the frames are not MAVLink"
     if c.incompatible:
         yield f"{c.incompatible} frames have unknown flags"
+    if f.kernel_filter:
+        yield "a gateway filters here in the kernel and does not count lost frames: kernel_filter"
 
 
 def _vehicle(s: Speaker) -> Iterator[str]:
     if s.status is None:
         return
     kind = named(mav.AUTOPILOT_NAMES, s.autopilot or 0), s.status.firmware, named(mav.TYPE_NAMES, s.type or 0)
-    yield f"vehicle {s.ids}: {', '.join(filter(None, kind))}, flight mode {s.status.flight_mode or 'unknown'}"
+    called = "" if s.status.name is None else f" '{s.status.name}'"
+    shown = s.silent.last if s.silent else s.status
+    yield f"vehicle {s.ids}{called}: {', '.join(filter(None, kind))}, flight mode {shown.flight_mode or 'unknown'}"
     yield "rates: " + ", ".join(
         f"{name} {'once' if hz is None else f'{hz:g} Hz'}" for name, hz in s.wanted.items() if hz != 0
     )
     if s.missing:
         yield f"missing: {', '.join(s.missing)}"
-    yield "status: " + ", ".join(f"{name} {_word(value)}" for name, value in s.status.fields.items())
+    if s.silent:
+        until, silence = rfc3339(s.silent.until_us), duration(s.silent.silence)
+        yield f"heard: for {s.silent.words}, until {until}; then silent for {silence}, so its status is unknown"
+    when = "status when it was last heard: " if s.silent else "status: "
+    yield when + ", ".join(f"{name} {_word(value)}" for name, value in shown.fields.items())
     yield from applet_heard(s)
-    for what, names in (("errors", s.status.errors), ("inhibits", s.status.inhibits)):
+    for what, names in (("errors", shown.errors), ("inhibits", shown.inhibits)):
         if names:
             yield f"{what}: {', '.join(names)}"
 
@@ -128,10 +140,28 @@ def _speaker(s: Speaker) -> dict[str, Any]:
         and {
             "flight_mode": s.status.flight_mode,
             **({} if s.status.firmware is None else {"firmware": s.status.firmware}),
+            **({} if s.status.name is None else {"name": s.status.name}),
             **s.status.fields,
             "errors": s.status.errors,
             "inhibits": s.status.inhibits,
         },
         "rates": s.wanted if s.status else {},
+        "heard": s.heard and _heard(s.heard),
         "applet": s.applet and {"value": s.applet.value, "age": round(s.applet.age, 3)},
+    }
+
+
+def _heard(heard: Heard) -> dict[str, Any]:
+    last = heard.last
+    return {
+        "seconds": round(heard.seconds, 3),
+        "times": heard.times,
+        "until": rfc3339(heard.until_us),
+        "silence": round(heard.silence, 3),
+        "status": {
+            "flight_mode": last.flight_mode,
+            **last.fields,
+            "errors": last.errors,
+            "inhibits": last.inhibits,
+        },
     }

@@ -6,7 +6,7 @@ Codes are stable: they are never reused, and new ones are appended.
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final, NamedTuple
+from typing import Final
 
 from ...interface.status import ErrorCause
 from ...mavlink.definitions import EXTENDED_SENSOR_NAMES, SENSOR_NAMES, SEVERITY_NAMES
@@ -18,6 +18,7 @@ from ...mavlink.enumerations import (
     MAV_SYS_STATUS_SENSOR_RC_RECEIVER,
     MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL,
 )
+from ...values import NamedTuple
 
 FLIGHT_TERMINATION: Final = 1001
 TERMINATION_ANNOUNCED: Final = 1002
@@ -35,6 +36,9 @@ LEAK: Final = 2010
 PRESSURE: Final = 2011
 TEMPERATURE: Final = 2012
 DEPTH_SENSOR: Final = 2013
+BATTERY_FAULT: Final = 2014
+OFFBOARD_LOST: Final = 2015
+MISSION: Final = 2016
 EMERGENCY: Final = 4000
 CRASH: Final = 4001
 HARD_LANDING: Final = 4002
@@ -42,6 +46,7 @@ THRUST_LOSS: Final = 4003
 PARACHUTE: Final = 4004
 YAW_IMBALANCE: Final = 4005
 ATTITUDE_FAILURE: Final = 4006
+ESC_FAILURE: Final = 4007
 INTERNAL_ERROR: Final = 5001
 CONFIGURATION: Final = 5002
 WATCHDOG_RESET: Final = 5003
@@ -123,8 +128,12 @@ CAUSES: Final[dict[int, Cause]] = {
     WATCHDOG_RESET: Cause("WATCHDOG_RESET", 25, Clears.ARMING),
     REBOOT_WHILE_ARMED: Cause("REBOOT_WHILE_ARMED", 26, Clears.ARMING),
     FAILSAFE: Cause("FAILSAFE", 27, Clears.FAILSAFE),
-    SYSTEM_ID_CONFLICT: Cause("SYSTEM_ID_CONFLICT", 28, Clears.HOLD, 10.0),
-    LINK_LOST: Cause("LINK_LOST", 29),
+    ESC_FAILURE: Cause("ESC_FAILURE", 28),
+    BATTERY_FAULT: Cause("BATTERY_FAULT", 29),
+    OFFBOARD_LOST: Cause("OFFBOARD_LOST", 30),
+    MISSION: Cause("MISSION", 31),
+    SYSTEM_ID_CONFLICT: Cause("SYSTEM_ID_CONFLICT", 32, Clears.HOLD, 10.0),
+    LINK_LOST: Cause("LINK_LOST", 33),
     **{EXTENDED_SENSOR + bit: Cause(f"SENSOR_{EXTENDED_SENSOR_NAMES.get(bit, bit)}", 200 + bit) for bit in range(32)},
     **{SENSOR + bit: Cause(f"SENSOR_{SENSOR_NAMES[bit]}", 100 + bit) for bit in range(31)},
     **{TEXT + level: Cause(f"TEXT_{SEVERITY_NAMES[level]}", 400 + level, Clears.HOLD) for level in range(3)},

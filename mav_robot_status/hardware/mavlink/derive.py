@@ -7,13 +7,16 @@ motion_possible FALSE. I3 error_code != 0 <=> in_error TRUE. I4 link stale => ev
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ...interface.fields import STATES
 from ...interface.status import Detail, Inhibit, LinkState, RobotStatus, Vehicle
 from ...mavlink.definitions import AUTOPILOT_NAMES, STATE_NAMES, TYPE_NAMES
+from ...values import NamedTuple
 from . import causes
 from .identity import named
+from .rules import high_latency
+from .rules.arming import can_arm
 from .rules.claimed import agreed
 from .rules.drives_powered import drives_powered, motion_possible
 from .rules.e_stopped import e_stopped
@@ -21,13 +24,13 @@ from .rules.errors import active_errors, in_error
 from .rules.flight_mode import flight_mode
 from .rules.in_motion import in_motion
 from .rules.inhibits import inhibit, inhibits
-from .rules.reason import FALSE, TRUE, Finding, Reason, Source
+from .rules.reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 
 if TYPE_CHECKING:
     from ...clock import Instant
     from ...interface.status import TriState
     from .autopilots.modes import FlightMode
-    from .facts import Facts
+    from .facts import Facts, Seldom
     from .options import HardwareOptions
 
 
@@ -47,10 +50,8 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
     if not facts.fresh.heartbeat:
         return _lost(facts, ids, before, now, options)
     mode = flight_mode(facts, options)
-    stopped, why_stopped = e_stopped(facts, options)
-    drives, why_drives = drives_powered(facts, options, stopped, why_stopped)
-    possible, why_possible = motion_possible(facts, options, mode, drives, why_drives)
-    moving, why_moving = in_motion(facts, options)
+    found = _seldom(facts.seldom, facts, options, mode) if facts.seldom else _found(facts, options, mode)
+    (stopped, why_stopped), (drives, why_drives), (possible, why_possible), (moving, why_moving) = found
     why_mode, doubted = Reason(mode.rule, Source.MODE_NUMBER), facts.claimed.doubted
     if doubted:
         known = agreed(facts.claimed, mode.mode, drives)
@@ -87,6 +88,22 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
     return Derived(status, detail, reasons)
 
 
+def _found(facts: Facts, options: HardwareOptions, mode: FlightMode) -> tuple[Finding, Finding, Finding, Finding]:
+    """e_stopped, drives_powered, motion_possible and in_motion of a vehicle that sends HEARTBEATs."""
+    stopped = e_stopped(facts, options)
+    drives = drives_powered(facts, options, *stopped)
+    return stopped, drives, motion_possible(facts, options, mode, *drives), in_motion(facts, options)
+
+
+def _seldom(
+    told: Seldom, facts: Facts, options: HardwareOptions, mode: FlightMode
+) -> tuple[Finding, Finding, Finding, Finding]:
+    """The same of a vehicle that is heard by HIGH_LATENCY2 alone."""
+    drives = high_latency.drives_powered(told, facts, options)
+    possible = high_latency.motion_possible(facts, options, mode, drives)
+    return high_latency.e_stopped(options), drives, possible, high_latency.in_motion(told)
+
+
 def _why_not(
     facts: Facts,
     possible: TriState,
@@ -96,7 +113,7 @@ def _why_not(
     before: Detail,
     now: Instant,
 ) -> tuple[Inhibit, ...]:
-    """The inhibits. While senders differ, what one of them says is no reason."""
+    """The inhibits. While senders differ, what one of them says is not a reason."""
     if possible is TRUE:
         return ()
     if facts.claimed.doubted and possible is not FALSE:
@@ -133,8 +150,11 @@ def _vehicle(facts: Facts) -> Vehicle:
 
 def _running(facts: Facts, mode: FlightMode) -> Vehicle:
     """The whole of it while the link is connected."""
+    armable = can_arm(facts)
     return _vehicle(facts)._replace(
         flight_mode=mode.name,
         custom_mode=facts.heartbeat.custom_mode,
-        state=named(STATE_NAMES, facts.heartbeat.system_status),
+        state=None if facts.seldom else named(STATE_NAMES, facts.heartbeat.system_status),
+        can_arm=None if armable is UNKNOWN else armable is TRUE,
+        modes_blocked=facts.arming.modes_blocked,
     )

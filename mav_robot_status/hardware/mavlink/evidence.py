@@ -14,6 +14,7 @@ from .causes import EXTENDED_SENSOR, SENSOR
 from .identity import named, sensor_name
 from .rules.reason import Reason, Source
 from .state import outputs
+from .state.high_latency import speed
 
 if TYPE_CHECKING:
     from .facts import Facts
@@ -35,7 +36,9 @@ class EvidenceOfVehicle(Mapping[str, Evidence]):
 
     def __getitem__(self, field: str) -> Evidence:
         reason = self._reasons[field]
-        return Evidence(reason.rule, *SHOW[reason.source](self._state, self._facts, reason))
+        seldom = self._facts.seldom is not None and reason.source in OF_HEARTBEAT
+        show = _high_latency if seldom else SHOW[reason.source]
+        return Evidence(reason.rule, *show(self._state, self._facts, reason))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._reasons)
@@ -127,6 +130,12 @@ def _latch(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     return (None, None) if latch is None else (latch.source, latch.last)
 
 
+def _parts(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    faults = [fault for (_, code), fault in state.faulty_parts.items() if code == reason.code]
+    latest = max(faults, key=lambda fault: fault.last, default=None)
+    return (None, None) if latest is None else (latest.source, latest.last)
+
+
 def _claims(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     claims = state.claims
     if claims.conflict is not None:
@@ -167,6 +176,19 @@ def _attitude(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     return f"ATTITUDE: {state.turning:.2f} rad/s", _at(state.latest.attitude)
 
 
+def _high_latency(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    known = state.high_latency
+    if known is None:
+        return None, None
+    m = known.message
+    text = f"custom_mode {m.custom_mode}, custom0 {m.custom0}, failure_flags 0x{m.failure_flags:x}"
+    return f"HIGH_LATENCY2: {text}, groundspeed {speed(m):g} m/s", known.at
+
+
+OF_HEARTBEAT: Final = frozenset(
+    {Source.HEARTBEAT, Source.BASE_MODE, Source.CUSTOM_MODE, Source.MODE_NUMBER, Source.STATE, Source.STATE_AND_RC}
+)
+"""What HIGH_LATENCY2 says if the vehicle sends no HEARTBEAT."""
 SHOW: Final[dict[Source, Show]] = {
     Source.NONE: _nothing,
     Source.HEARTBEAT: _heartbeat("HEARTBEAT"),
@@ -187,6 +209,7 @@ SHOW: Final[dict[Source, Show]] = {
     Source.APPLET_AND_OUTPUTS: _applet_and_outputs,
     Source.RC_CHANNELS: _rc_channels,
     Source.LATCH: _latch,
+    Source.PARTS: _parts,
     Source.CLAIMS: _claims,
     Source.ESC: _esc,
     Source.OUTPUTS: _outputs,
@@ -195,5 +218,6 @@ SHOW: Final[dict[Source, Show]] = {
     Source.VELOCITY: _velocity,
     Source.GPS: _gps,
     Source.ATTITUDE: _attitude,
+    Source.HIGH_LATENCY: _high_latency,
 }
 assert set(SHOW) == set(Source)

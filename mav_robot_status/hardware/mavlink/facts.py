@@ -6,10 +6,11 @@ facts, because each message changes them; `evidence` reads them from the state.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from ...interface.status import TriState
 from ...mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
+from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from ...mavlink.definitions import Heartbeat
@@ -51,6 +52,8 @@ class Movement(NamedTuple):
     """With hysteresis."""
     is_slow: bool
     """Whether an unknown motion is below the lower thresholds, not yet for long enough."""
+    is_fast: bool
+    """Whether an unknown motion is above the upper thresholds, not yet for long enough."""
     is_measured: bool
     """Whether the latest sample is an estimate."""
     moves_disarmed: bool
@@ -103,6 +106,8 @@ class SystemStatus(NamedTuple):
     """Unix microseconds."""
     rc_lost_with_state: bool
     """Whether the RC receiver was lost when the vehicle entered its state."""
+    unhealthy: int
+    """What a disarmed PX4 reports as enabled and unhealthy, the extended word shifted up by 32. 0 of others."""
 
 
 class Cause(NamedTuple):
@@ -143,13 +148,47 @@ class Claimed(NamedTuple):
     one_mode: bool
 
 
-class Explained(NamedTuple):
-    """The text that the autopilot sent."""
+class Seldom(NamedTuple):
+    """What HIGH_LATENCY2 tells beside the mode."""
 
-    not_ready: str | None
-    """The reason why it cannot be armed."""
+    armed: TriState
+    moves: bool
+    failures: tuple[Cause, ...]
+
+
+class NotReady(NamedTuple):
+    """A reason why the vehicle cannot be armed."""
+
+    text: str | None
+    since_us: int
+    """Unix microseconds."""
+
+
+class Explained(NamedTuple):
+    """The texts that the autopilot sent."""
+
+    not_ready: tuple[NotReady, ...]
+    """The reasons why it cannot be armed, by texts."""
     failsafe: str | None
     """The text about a failsafe that its state reports."""
+
+
+class Parts(NamedTuple):
+    """What the parts of the vehicle report about themselves."""
+
+    faults: tuple[Cause, ...]
+    not_ready: tuple[NotReady, ...]
+
+
+class Arming(NamedTuple):
+    """The latest report of the arming checks."""
+
+    can_arm: TriState
+    """Whether they pass in the current mode. UNKNOWN: there is no report, or not all of it has arrived."""
+    modes_blocked: tuple[str, ...] | None
+    """The flight modes in which they fail. None: not known."""
+    failing: tuple[NotReady, ...]
+    """The checks that fail in the current mode of a disarmed vehicle, the most restrictive first."""
 
 
 class Facts(NamedTuple):
@@ -157,6 +196,9 @@ class Facts(NamedTuple):
 
     kind: Kind
     heartbeat: Heartbeat
+    """The latest one, or what a HIGH_LATENCY2 says instead."""
+    seldom: Seldom | None
+    """What HIGH_LATENCY2 tells, if the vehicle sends no HEARTBEAT. None: it does."""
     state_since: int
     """When it entered its MAV_STATE, Unix microseconds."""
     fresh: Fresh
@@ -168,6 +210,8 @@ class Facts(NamedTuple):
     """Whether it turns, according to the rotation alone."""
     has_no_lift: bool
     """Whether an aircraft that reports to be in the air has no throttle that carries it."""
+    lies: bool
+    """Whether a multicopter has not moved since it lay on the ground for certain."""
     outputs: Outputs
     outputs_vetoed: bool
     """Whether a motion shows that the vehicle is driven although the outputs seem held."""
@@ -185,6 +229,8 @@ class Facts(NamedTuple):
     faults: tuple[SensorFault, ...]
     latched: Latched
     explained: Explained
+    parts: Parts
+    arming: Arming
     mode_hints: ModeHints
     claimed: Claimed
     text_overdue: bool

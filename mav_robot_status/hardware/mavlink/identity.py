@@ -73,6 +73,8 @@ MULTIROTORS: Final = (
     mavlink.MAV_TYPE_DECAROTOR,
     mavlink.MAV_TYPE_GENERIC_MULTIROTOR,
 )
+FIXED_PITCH: Final = frozenset(MULTIROTORS) - {mavlink.MAV_TYPE_HELICOPTER}
+"""The multirotors whose throttle alone is their thrust."""
 WINGED: Final = (
     mavlink.MAV_TYPE_FIXED_WING,
     mavlink.MAV_TYPE_FLAPPING_WING,

@@ -9,26 +9,39 @@ import logging
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from ...interface import DEFAULT_HANDLE_NAME, Detail, LinkState, RobotHW, RobotStatus
+from ...due_times import DueTimes
+from ...interface import LinkState, RobotHW
 from ...mavlink import definitions as mav
 from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
+from .autopilots.wanted import METADATA
 from .derive import derive
 from .evidence import EvidenceOfVehicle
-from .handlers import overheard, pass_time
+from .handlers import overheard, pass_time, transmitter_heard
+from .handlers.high_latency import follows, high_latency, sends_heartbeats
+from .handlers.parts import TRANSMITTERS
 from .identity import is_autopilot, named
-from .message_table import APPLET_ID, COMMAND_IDS, HEARTBEAT_ID, KINDS
+from .message_table import (
+    APPLET_ID,
+    ARM_STATUS_ID,
+    COMMAND_IDS,
+    FILE_IDS,
+    HEARTBEAT_ID,
+    HIGH_LATENCY_ID,
+    KINDS,
+    PLAIN,
+)
 from .moment import Moment
-from .newcomers import Newcomers
 from .options import HardwareOptions
+from .places import Places
 from .requests.scheduler import Ask, RequestScheduler
 from .rules.inhibits import inhibit
 from .settle import claimed, facts_of
 from .state import motion
 from .state.applet import is_word
 from .state.claims import CLOCKS, CONTINUES, COUNTED_APART, Claims, Outcome
+from .state.high_latency import stated
 from .state.latest_messages import SILENCE
-from .state.vehicle_state import begin
-from .vehicle import ExpectedVehicle, TrackedVehicle
+from .state.vehicle_state import begin, timeout_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Container, Iterator, Sequence
@@ -36,19 +49,15 @@ if TYPE_CHECKING:
     from ...clock import Instant
     from ...mavlink.framing import Values
     from .facts import Facts
+    from .message_table import Settles
+    from .px4_events import EventTable
     from .state.vehicle_state import VehicleState
+    from .vehicle import ExpectedVehicle, Names, TrackedVehicle
 
 log = logging.getLogger(__name__)
 
-MOST_VEHICLES: Final = 256
-ESTABLISHED: Final = 5.0
-"""Seconds of heartbeats without a link loss after which a vehicle keeps its place and its handle."""
-LOGGED: Final = 5
-"""The most ids in one log line."""
-GONE: Final = 10.0
-"""Seconds after its link loss for which another vehicle keeps them, if there are more than MOST_PASSING of its kind: a
-few heartbeats may be forged, or a mistake."""
-MOST_PASSING: Final = 8
+Stamped = tuple["Instant", Any, bool]
+"""A record of a log: its time, its frame (`Values`; None at the end), and whether it starts a new segment."""
 LOG_WAYS: Final = 10.0
 """Seconds between two log lines about the way of one vehicle."""
 
@@ -62,39 +71,38 @@ class MavlinkRobotHW(RobotHW):
         slots: Sequence[ExpectedVehicle] = (),
         own_component: int = 192,
         claims: dict[tuple[int, int], Claims[Any]] | None = None,
+        names: Names | None = None,
     ) -> None:
         """`claims`: who speaks with the ids of each vehicle. Another part may look at it."""
         super().__init__()
         self.claims = {} if claims is None else claims
         self.options = options or HardwareOptions()
-        self._asking = RequestScheduler(self.options.watch_outputs, own_component)
-        # exact ids match before open ones
-        ordered = sorted(slots, key=lambda slot: (slot.system is None, slot.component is None))
-        self._expected = [TrackedVehicle(slot) for slot in ordered]
+        self._asking = RequestScheduler(self.options.watch_outputs, own_component, self.options.request_events)
+        self._places = Places(slots, self.handles, self.claims, names or {})
+        self._tracked = self._places.tracked
         self._short_timeouts = min(self.options.heartbeat_timeout, self.options.sys_status_timeout) < SILENCE
         """Whether a message can become too old within SILENCE. Then every message can make its kind fresh again."""
-        self._open = not slots
-        """Whether every autopilot that sends a HEARTBEAT gets a handle."""
-        self._tracked: dict[tuple[int, int], TrackedVehicle] = {}
+        self._due: DueTimes[TrackedVehicle] = DueTimes()
+        """The deadline of each vehicle: `next` of its moment. inf while it is in `dirty_vehicles`."""
         self.dirty_vehicles: list[TrackedVehicle] = []
         """The vehicles whose facts may have changed since the last `read`."""
         self.deadline = math.inf
         """The first deadline of all vehicles, monotonic seconds. -inf while a vehicle is in `dirty_vehicles`."""
         self.asks = False
         """Whether `due_requests` is called at all."""
-        self._newcomers = Newcomers()
-        self._crowded_until = -math.inf
-        """Until when (monotonic seconds) vehicles that were heard only briefly give up their places."""
-        self._expire_at = math.inf
-        """When (monotonic seconds) the first vehicle that is not established loses its place."""
+        self.hear_file: Callable[[TrackedVehicle, Any, float], None] | None = None
+        """Called with each message that brings a file or its place, from the selected way of a vehicle."""
+        self._event_table: EventTable | None = None
+        """The words for the events of each vehicle without its own table."""
+        self._event_tables: dict[tuple[int, int], EventTable] = {}
         self._unheard = True
         """Whether the handles of vehicles that sent nothing still lack their inhibit LINK_STALE."""
         self.ignored = 0
         """Heartbeats of autopilots that no entry of the configuration names, or beyond MOST_VEHICLES."""
+        self.link_timeout: Callable[[Any], float | None] | None = None
+        """The timeout that the site gives to the link of a way, in seconds. None: it gives none to any link."""
         self.ignored_words = 0
-        """Words of the applet (RS_STOP) from a sender that is no vehicle."""
-        for slot in slots:
-            self.handles.register_handle(next(t.handle for t in self._expected if t.slot is slot))
+        """Words of the applet (RS_STOP) from a sender that is not a vehicle."""
 
     @property
     def vehicles(self) -> Iterator[TrackedVehicle]:
@@ -109,6 +117,30 @@ class MavlinkRobotHW(RobotHW):
         """Our ids, to which acknowledgements are addressed. `system` None: the system id of the vehicle."""
         self._asking.own_system, self._asking.own_component = system, component
 
+    def use_event_table(self, ids: tuple[int, int] | None, table: EventTable | None) -> None:
+        """Use the words of `table` for the events of the vehicle `ids`; None: of each vehicle without its own table.
+
+        `table` None: no longer use one.
+        """
+        if ids is None:
+            self._event_table = table
+        elif table is None:
+            self._event_tables.pop(ids, None)
+        elif ids in self._tracked:
+            self._event_tables[ids] = table
+        for tracked in self._tracked.values():
+            self._give_event_table(tracked)
+
+    def _give_event_table(self, tracked: TrackedVehicle) -> None:
+        state, ids = tracked.state, tracked.ids
+        if state is None or ids is None:
+            return
+        table = self._event_tables.get(ids, self._event_table)
+        if state.event_table is not table:
+            state.event_table = table
+            if not tracked.dirty:
+                self._mark_dirty(tracked)
+
     def take(self, frame: Values, now: Instant, way: Any = None) -> TrackedVehicle | None:
         """Process one frame that arrived on `way`: a channel, or None if there is only one.
 
@@ -120,6 +152,10 @@ class MavlinkRobotHW(RobotHW):
         except KeyError:
             if message_id in COMMAND_IDS:
                 self._overhear(message, ids, now)
+            elif message_id == HIGH_LATENCY_ID:
+                self._take_high_latency(frame, now, way)
+            elif message_id in FILE_IDS:
+                self._hear_file(message, ids, now, way)
             return None
         tracked = self._tracked.get(ids)
         if tracked is not None:
@@ -135,7 +171,9 @@ class MavlinkRobotHW(RobotHW):
         if message_id == HEARTBEAT_ID:
             tracked = sender = self._vehicle_of(tracked, frame, now, way)
         if tracked is None:
-            if message_id == APPLET_ID and is_word(message):
+            if message_id == ARM_STATUS_ID and ids[1] in TRANSMITTERS:
+                self._hear_transmitter(message, ids, now)
+            elif message_id == APPLET_ID and is_word(message):
                 self.ignored_words += 1
             return None
         state = tracked.state
@@ -143,41 +181,127 @@ class MavlinkRobotHW(RobotHW):
             if sender is not None:
                 tracked.state = begin(message, now, tracked.claims)
                 self._mark_dirty(tracked)
+                self._give_event_table(tracked)
             return sender
         if tracked.requests is not None and sender is None:
             self._asking.heard(tracked, message, message_id, now.mono)
+        unchanged = handler(state, message, now, self.options)
+        if tracked.dirty:
+            return sender
+        if not unchanged or state.latest.unsettled or not tracked.connected or now.mono >= tracked.deadline:
+            self._settle(tracked, state, settles, now)
+        return sender
+
+    def take_all(self, records: Iterator[Stamped], last: Instant, until: float) -> tuple[Instant, Stamped | None]:
+        """Take the records of a log before `until` (monotonic seconds) while nothing else is due.
+
+        Returns the time of the last one taken (`last` if none was), and the first record that is not taken. That is
+        None at the end of the log, or if a vehicle is in `dirty_vehicles` now. Nearly every frame of a log takes the
+        short way here: it does what `take` does with a message that concerns only the state of its vehicle.
+        """
         options = self.options
-        handler(state, message, now, options)
+        limit = min(until, self.deadline)
+        known: tuple[int, int] | None = None
+        tracked: TrackedVehicle | None = None
+        state: VehicleState | None = None
+        for record in records:
+            now, frame, new_segment = record
+            if new_segment or frame is None or now.mono >= limit:
+                return last, record
+            last = now
+            message_id, ids, sequence, message, _, _ = frame
+            if ids is not known:
+                known, tracked = ids, self._connected(ids)
+                state = None if tracked is None else tracked.state
+            if tracked is not None and state is not None and message_id in PLAIN:
+                claims = tracked.claims
+                if (sequence - claims.sequence) & 255 > CONTINUES:
+                    claims.broken = True
+                claims.sequence = sequence
+                if PLAIN[message_id](state, message, now, options) and not state.latest.unsettled:
+                    continue
+                self._settle(tracked, state, KINDS[message_id][1], now)
+            else:
+                known = None
+                self.take(frame, now)
+            if self.dirty_vehicles:
+                return last, None
+            limit = min(until, self.deadline)
+        return last, None
+
+    def _connected(self, ids: tuple[int, int]) -> TrackedVehicle | None:
+        """The vehicle of a log with these ids, if its heartbeats arrive."""
+        tracked = self._tracked.get(ids)
+        if tracked is None or tracked.state is None or not tracked.connected:
+            return None
+        return tracked if tracked.claims.way is None and tracked.requests is None else None
+
+    def _settle(self, tracked: TrackedVehicle, state: VehicleState, settles: Settles, now: Instant) -> None:
+        """Settle the facts that a message may have changed."""
         if state.latest.unsettled:
             if not tracked.dirty:
                 self._mark_dirty(tracked)
-            return sender
+            return
         facts, moment = tracked.facts, tracked.moment
         moment.now = now.mono
         for place, settle in settles:
-            if settle(state, moment, options) != facts[place]:
+            if settle(state, moment, self.options) != facts[place]:
                 self._mark_dirty(tracked)
-                return sender
-        if moment.next < self.deadline:
-            self.deadline = moment.next
-        return sender
+                return
+        if moment.next < tracked.deadline:
+            self._set_deadline(tracked, moment.next)
+
+    def _take_high_latency(self, frame: Values, now: Instant, way: Any) -> None:
+        """Process a HIGH_LATENCY2: as a HEARTBEAT, if no HEARTBEAT arrives, else as a claim."""
+        _, ids, sequence, message, _, _ = frame
+        beat: Values = (HEARTBEAT_ID, ids, sequence, stated(message), *frame[4:])
+        if not is_autopilot(beat[3], ids[1]):
+            return
+        tracked = self._tracked.get(ids)
+        state = None if tracked is None else tracked.state
+        if tracked is not None and state is not None:
+            claims = tracked.claims
+            if sends_heartbeats(state, now.mono, self.options):
+                claims.beside(beat[3], sequence, way, now)
+                self._settle_claims(tracked, now)
+                return
+            claims.lasts = timeout_of(state, self.options)
+            if claims.way is way and not follows(state, message):
+                return
+        if tracked is not None and tracked.claims.way is not way:
+            if not self._is_heard_elsewhere(tracked, beat, now, way):
+                return
+        elif tracked is not None:
+            tracked.claims.follow_own(sequence)
+        tracked = self._vehicle_of(tracked, beat, now, way)
+        if tracked is None:
+            return
+        if tracked.state is None:
+            tracked.state = begin(beat[3], now, tracked.claims)
+        high_latency(tracked.state, message, now, self.options)
+        if not tracked.dirty:
+            self._mark_dirty(tracked)
 
     def read(self, now: Instant) -> None:
         """Update the handles to `now`."""
         if self._unheard:
             self._report_unheard(now)
         if now.mono >= self.deadline:
-            if now.mono >= self._expire_at:
-                self._expire(now.mono)
-            self._look_again(now.mono)
-            for tracked in self._tracked.values():
-                if now.mono >= tracked.moment.next and not tracked.dirty:
-                    self._mark_dirty(tracked)
+            if now.mono >= self._places.expire_at and (gone := self._places.expired(now.mono, self.options)):
+                self._remove(gone)
+            while (tracked := self._look_again(now.mono)) is not None:
+                self._mark_dirty(tracked)
+            self._find_deadline()
         if self.dirty_vehicles:
             for tracked in self.dirty_vehicles:
                 self._evaluate(tracked, now)
             self.dirty_vehicles.clear()
             self._find_deadline()
+
+    @property
+    def requests_due(self) -> float:
+        """When (monotonic seconds) `due_requests` has work."""
+        return self._asking.next_due
 
     def explain(self, handle: str, now: Instant) -> None:
         """Update the evidence in a handle to `now`; `read` updates it only when a status may have changed."""
@@ -202,8 +326,12 @@ class MavlinkRobotHW(RobotHW):
         for one in ids:
             tracked = self._tracked.get(one)
             if tracked is not None and tracked.requests is not None:
-                tracked.requests.look_again(now)
+                tracked.requests.reconnected(now)
                 self._asking.next_due = -math.inf
+
+    def ask_for_tables(self, wanted: bool) -> None:
+        """Whether each PX4 is asked where the table of its events is."""
+        self._asking.without = frozenset() if wanted else frozenset({METADATA})
 
     def waits_for(self) -> list[str]:
         """What vehicles were asked for and have not sent yet, one line for each vehicle that still may send it."""
@@ -214,8 +342,9 @@ class MavlinkRobotHW(RobotHW):
 
         A time before `until` is exact. A later time is a lower bound: newer messages may postpone it.
         """
-        if self.deadline < until and not self.dirty_vehicles:
-            self._look_again(until)
+        if self.deadline <= until and not self.dirty_vehicles:
+            self._look_again(min(until, self._asking.next_due) if self.asks else until)
+            self._find_deadline()
         if self.asks:
             due = self._asking.next_due
             if due < self.deadline:
@@ -227,10 +356,9 @@ class MavlinkRobotHW(RobotHW):
 
         Statuses do not change until the next `read`.
         """
-        self._expire_at = -math.inf
+        self._places.expire_at = -math.inf
         for ids, theirs in other._tracked.items():
-            name = theirs.handle.name if other._open else None
-            tracked = None if theirs.state is None else self._place(ids, name)
+            tracked = None if theirs.state is None else self._places.place(ids)
             if tracked is None:
                 continue
             ours = tracked.handle
@@ -238,7 +366,12 @@ class MavlinkRobotHW(RobotHW):
             tracked.state, tracked.boots, tracked.losses = theirs.state, theirs.boots, theirs.losses
             tracked.established = theirs.established
             tracked.requests, tracked.parameters = theirs.requests, theirs.parameters
+            if self.link_timeout is None:
+                tracked.claims.timeout = None
             self._mark_dirty(tracked)
+            if ids in other._event_tables:
+                self._event_tables[ids] = other._event_tables[ids]
+            self._give_event_table(tracked)
 
     def forget(self, keep: Container[tuple[int, int]] = ()) -> None:
         """Drop all vehicle states, as at the start of a log segment. Handles keep their vehicles.
@@ -247,7 +380,8 @@ class MavlinkRobotHW(RobotHW):
         """
         for tracked in self._tracked.values():
             if tracked.ids not in keep:
-                _make_unheard(tracked)
+                tracked.forget()
+                self._set_deadline(tracked, math.inf)
         self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked.dirty]
         self._find_deadline()
         self._unheard = True
@@ -255,7 +389,7 @@ class MavlinkRobotHW(RobotHW):
     def _report_unheard(self, now: Instant) -> None:
         """Once: set LINK_STALE for each expected vehicle that sent nothing."""
         self._unheard = False
-        for tracked in self._expected:
+        for tracked in self._places.expected:
             if tracked.state is None:
                 unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
                 tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
@@ -271,6 +405,25 @@ class MavlinkRobotHW(RobotHW):
                 if tracked.state.stop is not before and not tracked.dirty:
                     self._mark_dirty(tracked)
 
+    def _hear_transmitter(self, message: mav.OpenDroneIdArmStatus, sender: tuple[int, int], now: Instant) -> None:
+        """Note what a Remote ID transmitter says to the autopilot of its system."""
+        for (system, _), tracked in self._tracked.items():
+            if system == sender[0] and tracked.state is not None:
+                before = tracked.state.faulty_parts
+                transmitter_heard(tracked.state, message, sender[1], now)
+                if tracked.state.faulty_parts is not before and not tracked.dirty:
+                    self._mark_dirty(tracked)
+
+    def _hear_file(self, message: Any, sender: tuple[int, int], now: Instant, way: Any) -> None:
+        """Hand on where a table of events is, or a piece of it."""
+        tracked = self._tracked.get(sender)
+        if tracked is None or tracked.claims.way is not way:
+            return
+        if type(message) is mav.ComponentMetadata and tracked.requests is not None:
+            tracked.requests.delivered(METADATA.id)
+        if self.hear_file is not None:
+            self.hear_file(tracked, message, now.mono)
+
     def _vehicle_of(
         self, tracked: TrackedVehicle | None, frame: Values, now: Instant, way: Any
     ) -> TrackedVehicle | None:
@@ -283,6 +436,8 @@ class MavlinkRobotHW(RobotHW):
         if tracked is not None:
             tracked.handle.heard_at = now.mono
             claims = tracked.claims
+            if self.link_timeout is not None:
+                claims.timeout = self.link_timeout(way)
             claims.heard(heartbeat, sequence, way, now)
             if claims.news is not None:
                 self._log_conflict(tracked)
@@ -291,69 +446,26 @@ class MavlinkRobotHW(RobotHW):
     def _discover(self, frame: Values, now: Instant, way: Any) -> TrackedVehicle | None:
         """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
         _, ids, _, heartbeat, _, _ = frame
-        tracked = self._place(ids) if self._has_place(ids, now.mono) else None
-        tracked = tracked or self._succeed(frame, now, way)
+        gone = self._places.room_for(ids, now.mono, self.options)
+        if gone:
+            self._remove(gone)
+        tracked = (None if gone is None else self._places.place(ids)) or self._succeed(frame, now, way)
         if tracked is None:
             self.ignored += 1
             return None
         names = named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), named(mav.TYPE_NAMES, heartbeat.type)
-        log.info("heard vehicle %d.%d (%s, %s): handle '%s'", *ids, *names, tracked.handle.name)
+        called = "" if tracked.name is None else f" '{tracked.name}'"
+        log.info("heard vehicle %d.%d%s (%s, %s): handle '%s'", *ids, called, *names, tracked.handle.name)
         return tracked
 
-    def _has_place(self, ids: tuple[int, int], now: float) -> bool:
-        """Whether a vehicle with these ids that sends its first HEARTBEAT gets a place. Frees one if all are taken."""
-        if any(t.matches(*ids) for t in self._expected):
-            return True
-        if self._open:
-            full, holders = len(self._tracked) >= MOST_VEHICLES, list(self._tracked.values())
-        else:
-            full, holders = True, [t for t in self._expected if t.accepts(*ids) and not t.established]
-        if full and not holders:
-            return False
-        if not self._newcomers.admits(ids, full, now):
-            return False
-        if full:
-            silent = [t for t in holders if now - _last_heard(t) > self.options.heartbeat_timeout]
-            if not silent:
-                return False
-            self._remove([min(silent, key=lambda t: (t.established, _last_heard(t)))])
-        return True
-
-    def _is_passing(self, tracked: TrackedVehicle) -> bool:
-        """Whether it is silent, was heard only briefly, and the configuration does not name its handle."""
-        return self._open and tracked.handle.detail.link is LinkState.LOST and not tracked.established
-
-    def _expire(self, now: float) -> None:
-        """Free the places of the vehicles that are silent and were heard only briefly, if there are many."""
-        passing = [tracked for tracked in self._tracked.values() if self._is_passing(tracked)]
-        keep = self.options.heartbeat_timeout + GONE
-        gone = [tracked for tracked in passing if now >= _last_heard(tracked) + keep]
-        if len(passing) > MOST_PASSING:
-            self._crowded_until = now + keep
-        elif now > self._crowded_until:
-            gone, passing = [], [tracked for tracked in passing if now < _last_heard(tracked) + keep]
-        self._expire_at = min((_last_heard(t) + keep for t in passing if t not in gone), default=math.inf)
-        if gone:
-            first = ", ".join("{}.{}".format(*(tracked.ids or (0, 0))) for tracked in gone[:LOGGED])
-            more = f" and {len(gone) - LOGGED} more" if len(gone) > LOGGED else ""
-            log.info("no longer a vehicle, heard only briefly: %s%s", first, more)
-            self._remove(gone)
-
     def _remove(self, gone: list[TrackedVehicle]) -> None:
-        """Free the places of these vehicles. A handle that the configuration names stays, for another vehicle."""
+        """Free the places of these vehicles."""
         for tracked in gone:
-            assert tracked.ids is not None
-            del self._tracked[tracked.ids]
-            self.claims.pop(tracked.ids, None)
-            _make_unheard(tracked)
-            if tracked in self._expected:
-                tracked.ids = None
-                tracked.handle.detail = Detail(tracked.slot.system, tracked.slot.component, link=LinkState.NEVER_SEEN)
-                tracked.requests = tracked.parameters = None
-                self._unheard = True
-            else:
-                self.handles.remove_handle(tracked.handle.name)
-        self.changed = True
+            if tracked.ids is not None:
+                self._event_tables.pop(tracked.ids, None)
+            self._places.remove(tracked)
+            self._set_deadline(tracked, math.inf)
+        self._unheard = self.changed = True
         self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked not in gone]
         self._find_deadline()
 
@@ -364,7 +476,7 @@ class MavlinkRobotHW(RobotHW):
         says stays a claim. Any other component of the system is a claim itself.
         """
         _, ids, sequence, heartbeat, _, _ = frame
-        for tracked in self._expected:
+        for tracked in self._places.expected:
             owner = tracked.ids
             if owner is None or tracked.slot.component is not None or tracked.slot.system not in (None, ids[0]):
                 continue
@@ -372,11 +484,10 @@ class MavlinkRobotHW(RobotHW):
             if same_system and ids[1] == MAV_COMP_ID_AUTOPILOT1:
                 log.info("vehicle %d.%d: its handle '%s' is now that of %d.%d", *owner, tracked.handle.name, *ids)
                 former = tracked.claims.mine
-                _make_unheard(tracked)
+                tracked.forget()
+                self._set_deadline(tracked, math.inf)
                 tracked.requests = tracked.parameters = None
-                del self._tracked[owner]
-                self.claims.pop(owner, None)
-                self._give(tracked, ids)
+                self._places.give(tracked, ids)
                 if former is not None:
                     tracked.claims.others[owner] = former
                 return tracked
@@ -396,7 +507,7 @@ class MavlinkRobotHW(RobotHW):
         booted = state.boot.at if state is not None and state.boot.clock_ms is not None else None
         if message_id == HEARTBEAT_ID and is_autopilot(message, ids[1]):
             before = claims.way
-            outcome = claims.elsewhere(message, sequence, way, now, booted, self.options.heartbeat_timeout)
+            outcome = claims.elsewhere(message, sequence, way, now, booted, tracked.timeout(self.options))
             if outcome is not Outcome.UNUSED:
                 if outcome is Outcome.EXCHANGED:
                     log.warning("vehicle %d.%d: another vehicle has these ids now, on %s", *ids, way)
@@ -423,8 +534,8 @@ class MavlinkRobotHW(RobotHW):
         moment.now = now.mono
         if claimed(state, moment, self.options) != tracked.facts.claimed:
             self._mark_dirty(tracked)
-        elif moment.next < self.deadline:
-            self.deadline = moment.next
+        elif moment.next < tracked.deadline:
+            self._set_deadline(tracked, moment.next)
 
     def _log_conflict(self, tracked: TrackedVehicle) -> None:
         """Log once that a conflict has begun."""
@@ -435,46 +546,41 @@ class MavlinkRobotHW(RobotHW):
         places = f": {' and '.join(ways)}" if ways else ""
         log.warning("two autopilots claim the ids %d.%d%s (%s)", *(tracked.ids or (0, 0)), places, found.why)
 
-    def _place(self, ids: tuple[int, int], name: str | None = None) -> TrackedVehicle | None:
-        """A new vehicle with these ids; None if no entry matches. `name` is the name of its handle if that is new."""
-        tracked = next((t for t in self._expected if t.matches(*ids)), None)
-        if tracked is None and self._open and len(self._tracked) < MOST_VEHICLES:
-            if name is None:
-                name = DEFAULT_HANDLE_NAME if not self._tracked else f"{DEFAULT_HANDLE_NAME}/{ids[0]}.{ids[1]}"
-            tracked = TrackedVehicle(ExpectedVehicle(*ids, name))
-            self.handles.register_handle(tracked.handle)
-        if tracked is not None:
-            self._give(tracked, ids)
-        return tracked
-
-    def _give(self, tracked: TrackedVehicle, ids: tuple[int, int]) -> None:
-        """These ids to a vehicle."""
-        tracked.ids = ids
-        tracked.claims = self.claims.setdefault(ids, tracked.claims)
-        self._tracked[ids] = tracked
-
     def _mark_dirty(self, tracked: TrackedVehicle) -> None:
         """Make a `read` due at once, to evaluate this vehicle. Until then its messages settle no facts."""
         tracked.dirty = True
         if tracked.state is not None:
             tracked.state.latest.unsettled = True
         self.dirty_vehicles.append(tracked)
+        self._set_deadline(tracked, math.inf)
         self.deadline = -math.inf
 
-    def _look_again(self, until: float) -> None:
-        """Postpone each deadline up to `until` at which the facts do not change, because messages kept arriving."""
-        for tracked in self._tracked.values():
-            while tracked.moment.next <= until and tracked.state is not None and not tracked.dirty:
-                moment = Moment(tracked.moment.next)
-                if facts_of(tracked.state, moment, self.options) != tracked.facts:
-                    break
-                tracked.moment = moment
-        self._find_deadline()
+    def _look_again(self, until: float) -> TrackedVehicle | None:
+        """Postpone the first deadlines at which the facts do not change, because messages kept arriving.
+
+        Returns the vehicle of the first deadline up to `until` at which they do; None if there is none.
+        """
+        while self._due.first <= until:
+            tracked = self._due.first_key()
+            if tracked.state is None:
+                self._set_deadline(tracked, math.inf)
+                continue
+            moment = Moment(tracked.moment.next)
+            if facts_of(tracked.state, moment, self.options) != tracked.facts:
+                return tracked
+            tracked.moment = moment
+            self._set_deadline(tracked, moment.next)
+        return None
+
+    def _set_deadline(self, tracked: TrackedVehicle, at: float) -> None:
+        tracked.deadline = at
+        self._due.set(tracked, at)
+        if at < self.deadline:
+            self.deadline = at
 
     def _find_deadline(self) -> None:
         """Set `deadline`."""
-        first = min((tracked.moment.next for tracked in self._tracked.values()), default=math.inf)
-        self.deadline = -math.inf if self.dirty_vehicles else min(first, self._expire_at)
+        self.deadline = -math.inf if self.dirty_vehicles else min(self._due.first, self._places.expire_at)
 
     def _evaluate(self, tracked: TrackedVehicle, now: Instant) -> None:
         """Update the handle of a vehicle to `now`. Derive a new status only if its facts have changed."""
@@ -492,11 +598,14 @@ class MavlinkRobotHW(RobotHW):
         state.latest.unsettled = self._short_timeouts
         if facts != tracked.facts:
             self._log_applet(tracked, facts)
+            self._log_heartbeats(tracked, facts)
             tracked.facts = facts
             self._renew(tracked, state, facts, now)
         tracked.dirty = False
-        if not facts.fresh.heartbeat:
+        tracked.connected = facts.fresh.heartbeat
+        if not tracked.connected:
             moment.next = math.inf
+        self._set_deadline(tracked, moment.next)
 
     def _renew(self, tracked: TrackedVehicle, state: VehicleState, facts: Facts, now: Instant) -> None:
         """Derive the status in the handle from the facts."""
@@ -504,11 +613,14 @@ class MavlinkRobotHW(RobotHW):
         handle = tracked.handle
         derived = derive(facts, tracked.ids, handle.detail, now, self.options)
         self._log_link(tracked, derived.detail.link)
+        detail = derived.detail
+        if tracked.name is not None:
+            detail = detail._replace(vehicle=detail.vehicle._replace(name=tracked.name))
         if derived.status != handle.status:
             handle.status = derived.status
             self.changed = True
-        if derived.detail != handle.detail:
-            handle.detail = derived.detail
+        if detail != handle.detail:
+            handle.detail = detail
             self.changed = True
         handle.evidence = EvidenceOfVehicle(state, facts, derived.reasons)
 
@@ -518,14 +630,6 @@ class MavlinkRobotHW(RobotHW):
         if tracked.requests is not None:
             tracked.requests.restart(now.mono)
             self._asking.next_due = -math.inf
-
-    def _note_loss(self, tracked: TrackedVehicle) -> None:
-        """Its link is lost: it keeps its place if it was there long enough, else for a while."""
-        assert tracked.state is not None
-        since = tracked.state.heartbeats.since.mono
-        tracked.established = tracked.established or _last_heard(tracked) - since >= ESTABLISHED
-        if self._open and not tracked.established:
-            self._expire_at = min(self._expire_at, _last_heard(tracked) + self.options.heartbeat_timeout + GONE)
 
     def _log_applet(self, tracked: TrackedVehicle, facts: Facts) -> None:
         was_heard = tracked.facts.applet.is_heard if tracked.facts else False
@@ -537,6 +641,20 @@ class MavlinkRobotHW(RobotHW):
         else:
             log.info("vehicle %d.%d: the applet reports the emergency stop", *ids)
 
+    def _log_heartbeats(self, tracked: TrackedVehicle, facts: Facts) -> None:
+        """Log once that HIGH_LATENCY2 counts, or that HEARTBEATs do again: then ask again for what is missing."""
+        did_not = bool(tracked.facts) and tracked.facts.seldom is not None  # type: ignore[union-attr]
+        if did_not is (facts.seldom is not None):
+            return
+        ids = tracked.ids or (0, 0)
+        if did_not:
+            log.info("vehicle %d.%d sends HEARTBEATs", *ids)
+            self._asking.next_due = -math.inf
+            if tracked.requests is not None:
+                tracked.requests.look_again(tracked.moment.now)
+        else:
+            log.info("vehicle %d.%d is heard by HIGH_LATENCY2 only: nothing is sent to it", *ids)
+
     def _log_link(self, tracked: TrackedVehicle, state: LinkState) -> None:
         before = tracked.handle.detail.link
         if state is before:
@@ -545,29 +663,9 @@ class MavlinkRobotHW(RobotHW):
         ids = tracked.ids or (0, 0)
         if state is LinkState.LOST and before is LinkState.CONNECTED:
             tracked.losses += 1
-            self._note_loss(tracked)
-            log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, self.options.heartbeat_timeout)
+            self._places.lost(tracked, self.options)
+            log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, tracked.timeout(self.options))
         elif state is LinkState.CONNECTED and before is LinkState.LOST:
             log.info("vehicle %d.%d is back", *ids)
             if tracked.requests is not None:
-                tracked.requests.look_again(tracked.handle.heard_at or 0.0)
-
-
-def _last_heard(tracked: TrackedVehicle) -> float:
-    """When (monotonic seconds) a vehicle sent its last HEARTBEAT; -inf if it sent none."""
-    heard_at = tracked.handle.heard_at
-    return -math.inf if heard_at is None else heard_at
-
-
-def _make_unheard(tracked: TrackedVehicle) -> None:
-    """The state before the first HEARTBEAT. The ids stay."""
-    tracked.state, tracked.facts = None, ()
-    tracked.boots = 0
-    tracked.established = False
-    tracked.dirty, tracked.moment = False, Moment(-math.inf)
-    tracked.claims.forget()
-    system, component = tracked.ids or (None, None)
-    tracked.handle.status = RobotStatus()
-    tracked.handle.detail = Detail(system, component, link=LinkState.NEVER_SEEN)
-    tracked.handle.heard_at = None
-    tracked.handle.evidence = {}
+                tracked.requests.reconnected(tracked.handle.heard_at or 0.0)

@@ -6,11 +6,12 @@ The annotations are the schema from which the configuration is read and checked:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, Final, Literal, NamedTuple
+from dataclasses import field
+from typing import Annotated, Final, Literal
 
 from ...interface import RobotMode
 from ...mavlink.definitions import EXTENDED_SENSOR_NAMES, SENSOR_NAMES
+from ...values import NamedTuple, dataclass
 
 
 class Within(NamedTuple):
@@ -27,11 +28,21 @@ class OneOf(NamedTuple):
     names: tuple[str, ...]
 
 
+class Or(NamedTuple):
+    """The word for None in a file."""
+
+    word: str
+
+
 Timeout = Annotated[float, Within(0.1, 3600.0, "s")]
 Hold = Annotated[float, Within(0.0, 3600.0, "s")]
 Speed = Annotated[float, Within(0.0, 100.0, "m/s")]
 CustomMode = Annotated[int, Within(0, 2**32 - 1)]
+ModeOverrides = Mapping[CustomMode, RobotMode]
+"""A file may write the name of a mode instead of its number, see `autopilots.mode_names`."""
 VehicleKey = Literal["copter", "plane", "rover", "sub", "tracker", "blimp", "px4", "other"]
+Path = Annotated[str | None, Or("none")]
+"""A file."""
 Sensor = Annotated[str, OneOf((*SENSOR_NAMES.values(), *EXTENDED_SENSOR_NAMES.values()))]
 
 BELOW: Final = {"v_off": "v_on", "v_off_disarmed": "v_on_disarmed"}
@@ -70,9 +81,11 @@ class HardwareOptions:
     """Disarmed: motion begins above this speed, m/s; higher than when armed, because of GPS noise."""
     v_off_disarmed: Speed = 0.30
     """Disarmed: motion ends below this speed, m/s."""
-    mode_overrides: Mapping[VehicleKey, Mapping[CustomMode, RobotMode]] = field(default_factory=dict)
+    mode_overrides: Mapping[VehicleKey, ModeOverrides] = field(default_factory=dict)
     """By vehicle family and custom_mode: the mode to publish instead of the one in the tables."""
     ignore_sensors: frozenset[Sensor] = frozenset()
     """Sensors with known faults, which are not errors at this site."""
-    request_events: bool = False
+    request_events: bool = True
     """Request lost events from PX4 again."""
+    px4_events: Path = None
+    """The table of events of the PX4 firmware, all_events.json or all_events.json.xz. None: events without words."""

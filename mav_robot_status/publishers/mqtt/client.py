@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import socket
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
-from .error_reporter import unreachable
+from mav_robot_status.values import NamedTuple
+
 from .options import VERSIONS
+from .reasons import unreachable
 
 if TYPE_CHECKING:
     from .settings import Broker

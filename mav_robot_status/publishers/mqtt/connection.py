@@ -11,15 +11,15 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from .client import dial, make, shut
-from .error_reporter import lost, refusal, words
+from .reasons import lost, refusal, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from paho.mqtt.reasoncodes import ReasonCode
 
+    from ..error_reporter import ErrorReporter
     from .client import Will
-    from .error_reporter import ErrorReporter
     from .settings import Broker
 
 FIRST_WAIT, LONGEST_WAIT = 1.0, 30.0  # s between two attempts; doubled each time, with jitter

@@ -31,12 +31,14 @@ NOT_ONLINE: Final = "no gateway is online"
 class _Robot:
     """The state of one robot."""
 
-    __slots__ = ("at", "line", "live", "mark", "session", "seq", "state")  # noqa: RUF023
+    __slots__ = ("at", "last", "line", "live", "mark", "session", "seq", "state")  # noqa: RUF023
 
     def __init__(self) -> None:
         self.state = ""
         """The state of its connection."""
         self.line: dict[str, Any] = {}
+        self.last: dict[str, Any] | None = None
+        """The latest status with a connected link."""
         self.mark: tuple[Any, Any] = (None, None)
         """Stamp and seq of the latest status."""
         self.at = -math.inf
@@ -84,6 +86,11 @@ class Fleet:
         news, self._news = self._news, {}
         return news
 
+    def last(self, name: str) -> dict[str, Any] | None:
+        """The latest status of a robot whose link was connected, retained or not: the last that is known of it."""
+        robot = self._robots.get(name)
+        return None if robot is None else robot.last
+
     def expire(self, now: Instant) -> None:
         """Mark robots without a new status within the keep-alive as unknown. Call this about once a second."""
         for name, robot in self._robots.items():
@@ -115,6 +122,8 @@ class Fleet:
             return
         renewed = bool(line) and not retained and now.mono - robot.at <= self._keepalive
         robot.mark, robot.line, robot.at = mark, line or robot.line, now.mono
+        if line and line["link"].get("state") == "CONNECTED":
+            robot.last = line
         if renewed and robot.state == ONLINE:
             robot.live = True
             self._news[name] = {**line, "handle": name}

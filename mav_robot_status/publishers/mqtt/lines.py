@@ -29,7 +29,7 @@ def line_of(msg: RobotStatusMsg, seq: int) -> str:
 def unknown(line: Mapping[str, Any], stamp: str, why: str | None) -> dict[str, Any]:
     """The line of a robot without a live status: it has the robot's identity, and UNKNOWN for the rest."""
     seen = bool(line.get("stamp"))
-    vehicle = line.get("vehicle")
+    vehicle, members = line.get("vehicle"), line.get("members")
     return {
         "stamp": stamp,
         "seq": line.get("seq", 0),
@@ -46,6 +46,7 @@ def unknown(line: Mapping[str, Any], stamp: str, why: str | None) -> dict[str, A
             "custom_mode": None,
             "state": None,
         },
+        **({"members": members} if isinstance(members, list) else {}),
         "link": {"state": "LOST" if seen else "NEVER_SEEN", "heartbeat_age": None},
     }
 

@@ -8,6 +8,7 @@ import string
 from typing import TYPE_CHECKING, Final
 
 from ...errors import UsageError
+from ...interface import LinkState
 from ...interface.options import short
 
 if TYPE_CHECKING:
@@ -32,10 +33,23 @@ class Naming:
 
     def name(self, msg: RobotStatusMsg) -> str | None:
         """The robot's name, one level of a topic; None while a value of the template is unknown."""
-        of_vehicle = {"system": msg.detail.system, "component": msg.detail.component, "handle": msg.handle}
-        if any(value is None and place in self._used for place, value in of_vehicle.items()):
+        system, component = _ids(msg)
+        of_robot = {"system": system, "component": component, "handle": msg.handle}
+        if any(value is None and place in self._used for place, value in of_robot.items()):
             return None
-        return level(self._template.format_map({**of_vehicle, **self._known}))
+        return level(self._template.format_map({**of_robot, **self._known}))
+
+
+def _ids(msg: RobotStatusMsg) -> tuple[int | str | None, int | str | None]:
+    """System and component id in a name.
+
+    The handle stands for both where they do not name the robot: a group has the system id of its vehicle, and a robot
+    without MAVLink has none.
+    """
+    detail = msg.detail
+    if detail.members or (detail.system is None and detail.link is not LinkState.NEVER_SEEN):
+        return msg.handle, msg.handle
+    return detail.system, detail.component
 
 
 def places(template: str) -> frozenset[str]:

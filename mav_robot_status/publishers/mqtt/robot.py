@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from paho.mqtt.client import MQTTMessage
 
     from ...clock import Instant
-    from .error_reporter import ErrorReporter
+    from ..error_reporter import ErrorReporter
     from .settings import Broker
     from .spool import Event, Spool
 

@@ -13,9 +13,10 @@ import math
 import os
 import sqlite3
 from collections import Counter, deque
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ...errors import LinkError
+from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

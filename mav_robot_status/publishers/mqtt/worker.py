@@ -9,7 +9,7 @@ from collections import Counter, deque
 from typing import TYPE_CHECKING, Final
 
 from ...errors import LinkError
-from .error_reporter import ErrorReporter
+from ..error_reporter import ErrorReporter
 from .journal import Journal
 from .lines import line_of
 from .loop import Loop
@@ -48,7 +48,7 @@ class Worker:
             self._spool.add(event)
         self._place = self._journal.place
         self._loop = Loop(clock)
-        self._errors = ErrorReporter(settings.broker)
+        self._errors = ErrorReporter("mqtt", settings.broker.name)
         self._robots: dict[str, Robot] = {}
         self._lock = threading.Lock()
         self._latest: dict[str, RobotStatusMsg] = {}

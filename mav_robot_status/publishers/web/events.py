@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...clock import rfc3339
 from ...version import __version__
+from .said import said, with_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -58,9 +59,13 @@ class Events:
         clock: Callable[[], Instant],
         standing: Callable[[], float | None],
         stale_after: float | None = None,
+        alarm: bool = False,
     ) -> None:
         """`standing` returns for how many seconds the board's source has been stalled; None while it runs."""
-        self._board, self._clock, self._standing, self._stale_after = board, clock, standing, stale_after
+        self._board, self._clock, self._standing = board, clock, standing
+        self._stale_after, self._alarm = stale_after, alarm
+        self._said: dict[str, tuple[int, dict[str, Any]]] = {}
+        """What the page says of each handle, with the version of its entry. Made only while a browser needs it."""
         self._news = asyncio.Event()
         self._version, self._turn, self._ticked = -1, 0, 0.0
         self._fresh = False
@@ -137,15 +142,28 @@ class Events:
     def _change(self, sent: int, turn: int) -> bytes:
         now = self._clock()
         data: dict[str, Any] = {"now": rfc3339(now.unix_us), "standing": self._standing()}
-        data["vehicles"] = [entry.whole() for entry in self._board if entry.version > sent]
+        new = [entry for entry in self._board if entry.version > sent]
+        data["vehicles"] = [entry.whole() for entry in new]
+        data["headlines"] = {str(entry.line["handle"]): self._say(entry) for entry in new}
         if turn != self._turn:
             data["beats"] = {
                 handle: [entry.stamp, entry.heartbeat_age, round(now.mono - entry.at, 3)]
                 for handle, entry in self._board.entries.items()
             }
         if sent < 0:
-            data.update(source=socket.gethostname(), version=__version__, stale_after=self._stale_after)
+            data.update(source=socket.gethostname(), version=__version__)
+            data.update(stale_after=self._stale_after, alarm=self._alarm)
         return event("board" if sent < 0 else "change", data)
+
+    def _say(self, entry: Entry) -> dict[str, Any]:
+        handle = str(entry.line["handle"])
+        version, words = self._said.get(handle, (-1, {}))
+        if version != entry.version:
+            words = said(entry.whole(), entry.last)
+            self._said[handle] = entry.version, words
+            if len(self._said) > len(self._board.entries):  # some are gone
+                self._said = {name: self._said[name] for name in self._board.entries if name in self._said}
+        return words
 
     def _about(self, handle: str, entry: Entry, listener: Listener) -> Iterator[bytes]:
         now = self._clock().mono
@@ -161,7 +179,7 @@ class Events:
                         "ago": round(now - t.at, 3),
                         "stamp": t.stamp,
                         "name": t.name,
-                        "value": t.value,
+                        "value": with_words(t.value),
                         "before": t.before,
                     }
                     for t in new

@@ -22,3 +22,6 @@ class HttpOptions(Options):
     ] = None
     open: Annotated[bool, Option("show data to everybody who can reach HOST:PORT", "--http-open")] = False
     hosts: Annotated[tuple[str, ...], Option("further host names of the page: of a proxy or in DNS")] = ()
+    alarm: Annotated[
+        bool, Option("on the page, sound and mark each new error, stop and loss until it is acknowledged", "--alarm")
+    ] = False

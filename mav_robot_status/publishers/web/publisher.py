@@ -36,6 +36,7 @@ class HttpPublisher:
 
     options_type = HttpOptions
     check_options = staticmethod(read)
+    listens_on = staticmethod(lambda given: read(given)[:2])
 
     def __init__(self, context: PublisherContext) -> None:
         options = self.check_options(context.options)

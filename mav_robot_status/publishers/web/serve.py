@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 import math
 import mimetypes
@@ -16,10 +15,12 @@ from typing import TYPE_CHECKING, Any, Final
 from aiohttp import web
 
 from ...clock import now as present
-from ...interface import STATES
+from ...language import style_sheet
 from ...version import __version__
 from .access_control import AccessControl, add_headers
 from .events import PULSE, Events, Listener
+from .help_page import help_page
+from .looks import fields_module
 from .scrape import Scrapes
 from .settings import WebSettings, listen
 
@@ -40,6 +41,8 @@ LOG_PERIOD: Final = 60.0  # s between two log lines about connections that canno
 KEEP_ALIVE: Final = 15.0  # s
 CLOSING: Final = 2.0  # s to wait for the thread to end
 SCHEMA: Final = "robot_status.schema.json"
+GENERATED: Final = {"fields.js": fields_module, "tones.css": lambda: style_sheet().encode(), "help.html": help_page}
+"""The files of the page that are made from tables."""
 
 
 class WebServer:
@@ -54,7 +57,8 @@ class WebServer:
     ) -> None:
         """Listen. Raises LinkError if the port is in use. `scrapes` holds the waiting requests for metrics."""
         self.board = board
-        self._clock, self._stale_after, self._scrapes = clock, options.stale_after, scrapes
+        self._clock, self._scrapes = clock, scrapes
+        self._stale_after, self._alarm = options.stale_after, options.alarm
         self._socket = listen(options)
         host, port = self._socket.getsockname()[:2]
         self.url = f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
@@ -119,7 +123,7 @@ class WebServer:
         self._loop = asyncio.get_running_loop()
         self._loop.set_exception_handler(self._failed)
         self._stop = asyncio.Event()
-        self._events = Events(self.board, self._clock, self.standing, self._stale_after)
+        self._events = Events(self.board, self._clock, self.standing, self._stale_after, self._alarm)
         app = web.Application(middlewares=[self._access.middleware()])
         app.on_response_prepare.append(add_headers)
         self._add_routes(app)
@@ -157,7 +161,8 @@ class WebServer:
     def _add_routes(self, app: web.Application) -> None:
         for name, body in _assets().items():
             app.router.add_get("/" if name == "index.html" else f"/{name}", _asset(name, body))
-        app.router.add_get("/fields.js", _asset("fields.js", _fields_module()))
+        for name, made in GENERATED.items():
+            app.router.add_get(f"/{name}", _asset(name, made()))
         app.router.add_get(
             "/schema.json", _asset(SCHEMA, files("mav_robot_status").joinpath(f"data/{SCHEMA}").read_bytes())
         )
@@ -217,10 +222,10 @@ def serve(board: Board, options: WebSettings, scrapes: Scrapes | None = None) ->
 
 
 def find(board: Board, which: str) -> Entry | None:
-    """Find an entry by system id (the first of several), by `system.component`, or by handle."""
+    """Find an entry by system id (the first vehicle of several), by `system.component`, or by handle."""
     for entry in board:
         system, component = entry.line.get("system"), entry.line.get("component")
-        if which in (str(system), f"{system}.{component}"):
+        if which == f"{system}.{component}" or (which == str(system) and not entry.line.get("members")):
             return entry
     return board.entries.get(which)
 
@@ -228,12 +233,6 @@ def find(board: Board, which: str) -> Entry | None:
 def _assets() -> dict[str, bytes]:
     folder = files(__package__).joinpath("assets")
     return {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
-
-
-def _fields_module() -> bytes:
-    """The fields with named values, for the scripts of the page."""
-    rows = [{"name": field.name, "kind": field.kind.value, "meaning": field.row.meaning} for field in STATES]
-    return f"export const STATES = {json.dumps(rows)};\n".encode()
 
 
 def _asset(name: str, body: bytes) -> Callable[[web.Request], Any]:

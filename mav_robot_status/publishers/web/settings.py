@@ -6,10 +6,13 @@ import ipaddress
 import os
 import socket
 from stat import S_IRGRP, S_IROTH, S_IWGRP, S_IWOTH
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
-from ...errors import LinkError, UsageError
+from ...errors import UsageError
 from ...interface.options import short
+from ...values import NamedTuple
+from ..listener import listen as open_listener
+from ..listener import place, resolve
 from .options import DEFAULT_LISTEN, HttpOptions
 
 if TYPE_CHECKING:
@@ -22,6 +25,10 @@ SEND_BUFFER: Final = 1 << 16
 """Bytes that the kernel buffers for one browser. It is small, so that a browser that stops reading is noticed."""
 GONE: Final = 20_000
 """Milliseconds after which a browser that acknowledges nothing is cut off (TCP_USER_TIMEOUT)."""
+SOCKET_OPTIONS: Final = (
+    (socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER),
+    (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GONE),
+)
 BACKLOG: Final = 64
 
 
@@ -35,8 +42,10 @@ class WebSettings(NamedTuple):
     """The token that clients must send; None: every client gets data."""
     names: tuple[str, ...] = ()
     """Further host names that requests may use."""
+    alarm: bool = False
+    """Whether the page sounds and marks each new error, stop and loss."""
     stale_after: float | None = None
-    """Seconds without a line after which the page greys a vehicle; None: never."""
+    """Seconds without a line after which the page shows a vehicle as lost; None: never."""
 
 
 def read(given: Mapping[str, object]) -> WebSettings:
@@ -49,34 +58,22 @@ def read(given: Mapping[str, object]) -> WebSettings:
             f"http: {options.listen}: others on the network can see the data: add --http-token-file FILE (token_file), "
             "or --http-open (open: true) to show it to everybody"
         )
-    return WebSettings(host, port, token, options.hosts)
+    return WebSettings(host, port, token, options.hosts, options.alarm)
 
 
 def _address(text: str) -> tuple[str, int]:
     """`HOST:PORT`, `[IPv6]:PORT`, or a port on this computer."""
-    host, _, port = text.rpartition(":")
-    bare = host[1:-1] if host.startswith("[") and host.endswith("]") else host
-    if not (port.isascii() and port.isdigit() and len(port) <= 5 and int(port) <= 65535) or (
-        ":" in bare and bare == host
-    ):
+    found = place(text)
+    if found is None or found.port is None:
         raise UsageError(
             f"http: {short(text, 200)} is not an address to listen on; write HOST:PORT, for example {DEFAULT_LISTEN}"
         )
-    return bare or "127.0.0.1", int(port)
-
-
-def _resolve(host: str, port: int) -> tuple[int, tuple[Any, ...]]:
-    """Address family and address. Raises LinkError for a name that does not resolve."""
-    try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    except (OSError, UnicodeError):
-        raise LinkError(f"http: cannot resolve the name {host!r}") from None
-    return found[0][0], found[0][4]
+    return found.host or "127.0.0.1", found.port
 
 
 def is_loopback(host: str, port: int) -> bool:
     """Whether only this computer can reach that address."""
-    return ipaddress.ip_address(_resolve(host, port)[1][0].partition("%")[0]).is_loopback
+    return ipaddress.ip_address(resolve("http", host, port)[1][0].partition("%")[0]).is_loopback
 
 
 def read_token(path: str) -> str:
@@ -101,16 +98,4 @@ def read_token(path: str) -> str:
 
 def listen(options: WebSettings) -> socket.socket:
     """The listening socket. Raises LinkError, which names the port, if it cannot be opened."""
-    family, address = _resolve(options.host, options.port)
-    opened = socket.socket(family, socket.SOCK_STREAM)
-    try:
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # for a restart; a port in use stays an error
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)  # accepted connections inherit both
-        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GONE)
-        opened.bind(address)
-        opened.listen(BACKLOG)
-    except OSError as error:
-        opened.close()
-        raise LinkError(f"http: cannot listen on {options.host}:{options.port}/tcp: {error.strerror}") from None
-    opened.setblocking(False)
-    return opened
+    return open_listener("http", options.host, options.port, SOCKET_OPTIONS, BACKLOG)

@@ -42,6 +42,7 @@ from ...interface import (
 
 LIMIT: Final = 20.0
 """Seconds for all calls of a test. A publisher that takes longer blocks."""
+FLAGS: Final = ("live_only", "durable", "one_handle")
 START: Final = Instant(1000.0, 1_800_000_000_000_000)
 HOSTILE: Final = '"\\\n\x00\x1b[2J</script>\ud800é'
 """A text of an autopilot with hostile characters."""
@@ -120,17 +121,17 @@ class PublisherConformance:
         return made
 
     def test_its_flags_are_bools(self) -> None:
-        """`periodic`, and `live_only` and `durable` where the class sets them."""
+        """`periodic`, and the others where the class sets them."""
         made = self.make()
-        for flag in ("periodic", "live_only", "durable"):
+        for flag in ("periodic", *FLAGS):
             value = getattr(made, flag, False)
             assert isinstance(value, bool), f"{flag} must be a bool, not {value!r}"
         assert hasattr(made, "periodic"), "a publisher must have the attribute 'periodic'"
 
     def test_the_class_has_the_same_flags_as_the_object(self) -> None:
-        """The gateway reads `live_only` and `durable` before it makes a publisher."""
+        """The gateway reads them before it makes a publisher."""
         made = self.make()
-        for flag in ("live_only", "durable"):
+        for flag in FLAGS:
             assert getattr(type(made), flag, False) == getattr(made, flag, False), flag
 
     def test_an_unknown_option_is_an_error_if_the_options_are_declared(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..firmwares import ARDUROVER
-from ..scenario import RC_RECEIVER, Action, Scenario, Step, step, with_applet
+from ..scenario import RC_RECEIVER, Action, Scenario, Step, by_satellite, step, with_applet
 
 _HEALTH = ARDUROVER.ready.sensors_health
 _STOPPED = (0.0, 0.0, 0.0)
@@ -26,6 +26,24 @@ PREARM_FAILING = _scenario(
     step(2.0, "the compass fails: so do the pre-arm checks", prearm="Compass not healthy", sensors_health=_HEALTH & ~4),
     step(4.0, "the driver tries to arm and is refused", (2, "Arm: Compass not healthy")),
     step(8.0, "the compass is back", prearm="", sensors_health=_HEALTH),
+)
+REASONS = Scenario(
+    "cannot be armed for three reasons, of which two end; its first announcement comes before anybody listens",
+    ARDUROVER,
+    ARDUROVER.ready._replace(
+        prearm=("3D Accel calibration needed", "GPS 1: Bad fix", "Compass not calibrated"), position=False
+    ),
+    (
+        step(
+            12.0,
+            "a fix, and calibrated sensors; the driver tries to arm and is refused",
+            (2, "Arm: Compass not calibrated"),
+            prearm="Compass not calibrated",
+            position=True,
+        ),
+        step(13.5, "the driver tries again", (2, "Arm: Compass not calibrated")),
+        step(18.0, "the compass is calibrated", prearm=""),
+    ),
 )
 MANUAL = _scenario(
     "armed and driven by hand",
@@ -120,6 +138,7 @@ CRASH = _scenario(
     step(11.0, "the crash check holds it", (0, "Crash: Going to HOLD"), custom_mode=4, throttle=0),
     step(15.0, "the driver disarms", armed=False),
 )
+SATELLITE = by_satellite(AUTO, hz=0.2)
 LINK_SILENCE = _scenario(
     "the link is silent for 6 s while the rover drives",
     *_ARM_AND_DRIVE,

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..firmware import IN_AIR, LANDING, ON_GROUND, TAKEOFF, px4_mode
 from ..firmwares import PX4_QUAD
-from ..scenario import RC_RECEIVER, Action, Scenario, Step, step
+from ..scenario import RC_RECEIVER, Action, Scenario, Step, by_satellite, step
 
 _SENSORS = PX4_QUAD.ready.sensors_health
 _STILL = (0.0, 0.0, 0.0)
@@ -102,6 +102,7 @@ KILL = _scenario(
     step(15.0, "five seconds after the kill it disarms", armed=False),
     step(19.0, "released", (6, "Kill disengaged\t"), emergency_stop=False, prearm=""),
 )
+SATELLITE = by_satellite(AUTO, hz=0.015)
 LINK_SILENCE = _scenario(
     "the link is silent for 6 s while the quad hovers",
     *_TAKE_OFF,

@@ -12,13 +12,16 @@ const FINE = 2, CELL = 3; // px: an interval narrower than FINE is drawn togethe
 const SHORTEST = 1000; // microseconds: the limit of zoom
 const STEPS = [1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 5e6, 1e7, 15e6, 3e7, 6e7, 12e7, 3e8, 6e8, 9e8,
   18e8, 36e8, 72e8, 108e8, 216e8, 432e8, 864e8, 1728e8, 6048e8, 2592e9, 7776e9, 31536e9];
-const FIELDS = [ // track, class of its TRUE
-  ["link"], ["flight_mode"], ["mode"], ["armed", "on"], ["drives_powered", "on"], ["motion_possible", "on"],
-  ["in_motion", "on"], ["e_stopped", "stop"], ["in_error", "alarm"],
-];
+const FIELDS = ["link", "flight_mode", "mode", "armed", "drives_powered", "motion_possible", "in_motion", "e_stopped",
+  "in_error"];
 for (const name of new Set(DATA.logs.flatMap((log) => log.vehicles.flatMap(({ tracks }) => Object.keys(tracks))))) {
-  if (!FIELDS.some(([known]) => known === name)) FIELDS.push([name, "on"]);
+  if (!FIELDS.includes(name)) FIELDS.push(name);
 }
+// The word, glyph, tone and form of a value, from the one table of them. A name without a row has none.
+const lookOf = (track, value) => DATA.looks[track] && DATA.looks[track][value];
+const isState = (track) => lookOf(track, "TRUE") !== undefined;
+const FORMS = { full: [TOP, BODY], half: [TOP + BODY - 6, 6], line: [TOP + BODY - 3, 3], hatched: [TOP, BODY] };
+const KINDS = [["error", "Error causes"], ["inhibit", "Why motion is not possible"], ["unknown", "Why this is unknown"]];
 const MORE = 1000; // rows that the table of changes adds at once
 const MOST_CYCLES = 50; // arm cycles listed
 
@@ -94,31 +97,25 @@ function label(kind, x, width, text, y = 16) { // the text, cut to the width
   return [draw("text", { class: kind, x: x + 5, y }, letters < text.length ? `${text.slice(0, letters)}…` : text)];
 }
 
-// The drawing of a value. Not only the colour differs: TRUE fills the row, FALSE is a rail, UNKNOWN is hatched.
+// The drawing of a value. Its form says the same as its colour.
 function figure(row, span, x, width, right) {
-  const from = Math.max(0, x), seen = Math.min(right, x + width) - from;
-  switch (span.value) {
-    case "TRUE": return [box(row.on, x, width), ...label(`${row.on}-text`, from, seen, row.word(span))];
-    case "FALSE": return [box("off", x, width, TOP + BODY - 3, 3), ...label("off-text", from, seen, "FALSE", 14)];
-    case "CONNECTED":
-      return [box("off", x, width, TOP + BODY - 3, 3), ...label("off-text", from, seen, "CONNECTED", 14)];
-    case "UNKNOWN": return [box("unknown", x, width), ...label("halo", from, seen, "UNKNOWN")];
-    case "LOST": return [box("lost", x, width), ...label("halo", from, seen, "LOST")];
-    case "NEVER_SEEN": return [box("never", x, width), ...label("halo", from, seen, "NEVER SEEN")];
-    case "AUTO": if (row.id === "mode") return [box("on", x, width), ...label("on-text", from, seen, "AUTO")]; break;
-    case "MANUAL": if (row.id === "mode") return [box("manual", x, width), ...label("halo", from, seen, "MANUAL")];
-  }
-  return [box(`name-${span.index % 2}`, x, width), ...label("", from, seen, span.value)];
+  const from = Math.max(0, x), seen = Math.min(right, x + width) - from, look = row.look(span);
+  if (!look) return [box(`name-${span.index % 2}`, x, width), ...label("", from, seen, span.value)];
+  const [kind, y] = { full: ["full-text", 16], half: ["", 13], line: ["off-text", 14] }[look.bar] || ["halo", 16];
+  return [box(`${look.bar} ${look.tone}`, x, width, ...FORMS[look.bar]),
+    ...label(kind, from, seen, row.word(span), y)];
 }
 
 // Many short intervals in a few pixels: the height of TRUE is its share of the time.
 function texture(row, cell, x, width) {
   const whole = cell.end - cell.start || 1, yes = (cell.TRUE || 0) / whole, unsure = (cell.UNKNOWN || 0) / whole;
-  if (!row.on) return [box("off", x, width)];
-  const figures = [box("off", x, width, TOP + BODY - 3, 3)];
+  const figures = [box("line calm", x, width, ...FORMS.line)], look = row.look({ value: "TRUE" });
+  if (!look) return figures;
   const height = cell.TRUE === undefined ? 0 : Math.max(4, yes * BODY);
-  if (height) figures.push(box(row.on, x, width, TOP + BODY - height, height));
-  if (cell.UNKNOWN !== undefined) figures.push(box("unknown", x, width, TOP, Math.max(3, unsure * (BODY - height))));
+  if (height) figures.push(box(`full ${look.tone}`, x, width, TOP + BODY - height, height));
+  if (cell.UNKNOWN !== undefined) {
+    figures.push(box("hatched unknown", x, width, TOP, Math.max(3, unsure * (BODY - height))));
+  }
   return figures;
 }
 
@@ -158,11 +155,19 @@ class Log {
   constructor(data) {
     this.data = data;
     this.clock = new Clock(data.segments);
-    this.from = 0;
-    this.to = this.clock.length;
+    this.open = this.heard();
+    [this.from, this.to] = this.open;
     this.rows = [];
     this.pointers = new Map();
     this.build();
+  }
+
+  heard() { // from the first to the last heartbeat with a small margin; the whole log if that is most of it
+    const spans = this.data.vehicles.flatMap((v) => this.spans(v.tracks.link)).filter((s) => s.value === "CONNECTED");
+    const from = Math.min(...spans.map((s) => s.start)), to = Math.max(...spans.map((s) => s.end));
+    const whole = this.clock.length, margin = (to - from) * 0.02;
+    if (!spans.length || to - from > 0.9 * whole) return [0, whole];
+    return [Math.max(0, from - margin), Math.min(whole, to + margin)];
   }
 
   string(number) { return this.data.strings[number]; }
@@ -198,7 +203,7 @@ class Log {
     this.utc.plot.tabIndex = 0;
     this.utc.plot.setAttribute("role", "group");
     this.utc.plot.setAttribute("aria-label",
-      "Time axis. Left and right move, plus and minus zoom, 0 shows the whole flight");
+      "Time axis. Left and right move, plus and minus zoom, 0 shows the whole log");
     this.cross = make("div", { class: "cross" });
     this.thumb = make("i");
     this.chart = make("div", { class: "chart" }, this.utc.element, ...data.vehicles.map((v) => this.vehicle(v)),
@@ -209,11 +214,15 @@ class Log {
       make("div", { class: "head" }, make("div", {}, make("h2", {}, data.name), make("p", { class: "soft" }, about)),
         make("div", { class: "tools" }, this.range,
           button("−", "Zoom out (-)", () => this.zoom(2)), button("+", "Zoom in (+)", () => this.zoom(0.5)),
-          button("Whole flight", "Whole flight (0)", () => this.show(0, clock.length)))),
+          ...(this.isPart ? [button("When heard", "The time in which a vehicle was heard", () => this.show(...this.open))]
+            : []),
+          button("Whole log", "Whole log (0)", () => this.show(0, clock.length)))),
       count ? this.chart : make("p", {}, "This log has no heartbeat of an autopilot."),
       ...data.vehicles.map((v) => totalsOf(this, v)), count ? new Changes(this).element : null);
     this.listen();
   }
+
+  get isPart() { return this.open[1] - this.open[0] < this.clock.length; }
 
   plot(text, figures = "") {
     const svg = draw("svg", { height: ROW, "aria-hidden": "true" });
@@ -226,7 +235,7 @@ class Log {
     const kind = [vehicle.autopilot, vehicle.type].filter(Boolean).join(", ");
     const { totals } = vehicle;
     const element = make("div", { class: "vehicle" }, make("div", { class: "name" },
-      make("h3", {}, `Vehicle ${vehicle.name} `, make("span", { class: "soft" }, kind)),
+      make("h3", {}, `${vehicle.type === "GROUP" ? "Group" : "Vehicle"} ${vehicle.name} `, make("span", { class: "soft" }, kind)),
       make("p", { class: "soft" }, vehicle.handle)));
     const add = (row) => {
       const made = this.plot(row.title || row.id, row.figures);
@@ -242,25 +251,31 @@ class Log {
     };
     let cycle = 0;
     const cycles = totals.arm_cycles.map((c) => c.start + this.clock.shift(c.start));
-    for (const [id, on] of FIELDS) {
+    for (const id of FIELDS) {
       const spans = this.spans(vehicle.tracks[id]).filter((span) => span.value !== "");
-      const word = id !== "armed" ? () => "TRUE" : (span) => `TRUE, cycle ${span.cycle}`;
+      const look = (span) => lookOf(id, span.value);
+      const word = (span) => !look(span) ? span.value
+        : `${look(span).glyph} ${look(span).word}${span.cycle && span.value === "TRUE" ? `, cycle ${span.cycle}` : ""}`;
       if (id === "armed") {
         for (const span of spans) {
           if (cycles[cycle] === span.start) cycle++;
           span.cycle = cycle;
         }
       }
-      add({ id, on, spans, word, figures: shortly(id, totals) });
+      add({ id, look, spans, word, figures: shortly(id, totals) });
     }
-    const kinds = [["errors", "Error causes", "alarm"], ["inhibits", "Why motion is not possible", "why"]];
-    for (const [list, kind, on] of kinds) {
-      if (totals[list].length) element.append(make("div", { class: "group" }, kind));
-      for (const total of totals[list]) {
-        const spans = this.spans(vehicle[list][total.name]);
+    const losses = this.spans(vehicle.tracks.link).filter((span) => span.value === "LOST");
+    for (const [kind, heading] of KINDS) {
+      const found = [...totals.errors, ...totals.inhibits].filter((total) => total.kind === kind);
+      if (found.length) element.append(make("div", { class: "group" }, heading));
+      for (const total of found) {
+        const spans = this.spans(vehicle[kind === "error" ? "errors" : "inhibits"][total.name]);
         for (const span of spans) Object.assign(span, { text: span.value, value: "TRUE" });
         const title = total.code === null ? total.name : `${total.code} ${total.name}`;
-        add({ id: total.name, title, on, spans, reason: true, word: (span) => span.text || "",
+        const looks = { TRUE: { bar: kind === "unknown" ? "hatched" : "full", tone: total.tone, word: "active" },
+          UNKNOWN: { bar: "hatched", tone: "unknown", word: "unknown while the link is lost" } };
+        add({ id: total.name, title, spans: kind === "unknown" ? spans : throughLosses(spans, losses), reason: true,
+          total, look: (span) => looks[span.value], word: (span) => span.lost ? looks.UNKNOWN.word : span.text || "",
           figures: `${total.occurrences} ×, ${duration(total.active)}` });
       }
     }
@@ -377,8 +392,8 @@ class Log {
     if (x < -20) { wide += x + 20; x = -20; } // patterns far outside the view cost time
     wide = Math.min(wide, this.width + 40 - x);
     const figures = figure(row, span, x, wide, this.width);
-    if (row.reason && x >= 0) { // a mark that is visible even for a short cause
-      figures.push(draw("path", { class: `mark ${row.on}`, d: `M${Math.max(4, x) - 4} 1h8l-4 7z` }));
+    if (row.reason && !span.lost && x >= 0) { // a mark that is visible even for a short cause
+      figures.push(draw("path", { class: `mark ${row.total.tone}`, d: `M${Math.max(4, x) - 4} 1h8l-4 7z` }));
     }
     return figures;
   }
@@ -529,14 +544,23 @@ class Log {
 
   describe(row, span) { // value, time, evidence
     const name = row.title || row.id, many = this.data.vehicles.length > 1 ? `vehicle ${row.vehicle.name}, ` : "";
-    const state = row.reason ? "active" : row.on && span.value === "TRUE" ? row.word(span) : span.value;
+    const look = row.look(span), state = !look ? span.value : row.reason ? look.word : row.word(span);
     const from = this.clock.unix(span.start), lasted = duration(span.end - span.start);
     const words = [`${many}${name}: ${state}, ${lasted}, ${utc(from)} to ${utc(from + span.end - span.start)}`];
     if (span.text) words.push(`“${span.text}”`);
+    if (row.reason && !span.lost) words.push(row.total.sentence, ...row.total.steps);
     if (span.rule) words.push(span.rule);
     if (span.source) words.push(`[${span.source}]`);
     return words;
   }
+}
+
+// A lost link does not end a reason: nobody knows whether it goes on.
+function throughLosses(spans, losses) {
+  const ends = new Set(spans.map((span) => span.end));
+  const unsure = losses.filter((loss) => ends.has(loss.start)).map(({ start, end }) =>
+    ({ start, end, value: "UNKNOWN", lost: true }));
+  return [...spans, ...unsure].sort((a, b) => a.start - b.start).map((span, index) => Object.assign(span, { index }));
 }
 
 function firstAfter(spans, place) { // the first span that ends after the place
@@ -557,13 +581,13 @@ function indexAt(spans, place, near = 0) {
 
 // -- tables ------------------------------------------------------------------------------------------------------------
 
-function shortly(id, { values, arm_cycles: cycles }) {
-  const lasted = values[id];
+function shortly(id, { watched, linked, values, linked_values: inLink, arm_cycles: cycles }) {
+  const lasted = inLink[id];
   if (id === "armed") return `${cycles.length} ×, ${duration(lasted.TRUE || 0)}`;
-  if (id === "link") return lasted.LOST ? `lost ${duration(lasted.LOST)}` : "never lost";
+  if (id === "link") return `${lookOf(id, "CONNECTED").word} ${percent(values.link.CONNECTED || 0, watched)}`;
   if (id === "flight_mode") return "";
-  if (id === "mode") return `AUTO ${duration(lasted.AUTO || 0)}`;
-  return `TRUE ${duration(lasted.TRUE || 0)}`;
+  const value = isState(id) ? "TRUE" : "AUTO";
+  return `${lookOf(id, value).word} ${percent(lasted[value] || 0, linked)}`;
 }
 
 function table(caption, heads, rows) {
@@ -578,22 +602,26 @@ function table(caption, heads, rows) {
 }
 
 function totalsOf(log, vehicle) {
-  const { totals } = vehicle, { values, watched } = totals;
-  const lasted = (name, value) => {
-    const us = values[name][value] || 0;
-    return us ? [duration(us), make("span", { class: "share" }, percent(us, watched))] : "0 s";
-  };
+  const { totals } = vehicle, { watched, linked, values, linked_values: inLink } = totals;
+  const share = (us, whole) => us ? [duration(us), make("span", { class: "share" }, percent(us, whole))] : ["0 s"];
   const time = (at) => utc(log.clock.unix(at + log.clock.shift(at)), 1e6);
-  const fields = FIELDS.filter(([, drawn]) => drawn).map(([name]) => name);
+  const state = (name, value) => {
+    const { glyph, word } = lookOf(name, value);
+    return [make("span", { class: "said" }, `${glyph} ${word}`), ...share(inLink[name][value] || 0, linked)];
+  };
+  const named = (name, value, whole, from) => {
+    const { glyph, word } = lookOf(name, value);
+    return [`${name}: ${glyph} ${word}`, share(from[name][value] || 0, whole)];
+  };
   const parts = [
-    table(`Time in each state, of ${duration(watched)} since the first heartbeat`,
-      ["field", "#TRUE", "#FALSE", "#UNKNOWN"],
-      fields.map((name) => [name, lasted(name, "TRUE"), lasted(name, "FALSE"), lasted(name, "UNKNOWN")])),
-    table("Time in each mode, and without link", ["field", "#time"], [
-      ["link LOST", lasted("link", "LOST")],
-      ...["MANUAL", "AUTO", "UNKNOWN"].map((mode) => [`mode ${mode}`, lasted("mode", mode)]),
-      ...Object.keys(values.flight_mode).filter(Boolean).map((mode) =>
-        [`flight_mode ${clean(mode)}`, lasted("flight_mode", mode)])]),
+    table(`Time in each state, of ${duration(linked)} of linked time`, ["field", "#yes", "#no", "#unknown"],
+      FIELDS.filter(isState).map((name) => [name, ...["TRUE", "FALSE", "UNKNOWN"].map((value) => state(name, value))])),
+    table("Time in each mode, of linked time", ["mode", "#time"], [
+      ...Object.keys(DATA.looks.mode).map((value) => named("mode", value, linked, inLink)),
+      ...Object.keys(inLink.flight_mode).filter(Boolean).map((mode) =>
+        [`flight_mode: ${clean(mode)}`, share(inLink.flight_mode[mode], linked)])]),
+    table(`The link, of ${duration(watched)} since the first heartbeat`, ["link", "#time"],
+      Object.keys(DATA.looks.link).map((value) => named("link", value, watched, values))),
   ];
   if (totals.arm_cycles.length) {
     const count = totals.arm_cycles.length;
@@ -603,11 +631,12 @@ function totalsOf(log, vehicle) {
       [String(i + 1), time(c.start), utc(log.clock.unix(c.start + log.clock.shift(c.start)) + c.end - c.start, 1e6),
         duration(c.armed)])));
   }
-  for (const [list, caption] of [["errors", "Error causes"], ["inhibits", "Why motion was not possible"]]) {
-    if (!totals[list].length) continue;
-    parts.push(table(caption, ["name", "#times", "#time", "in the autopilot's words"], totals[list].map((t) =>
+  for (const [kind, caption] of KINDS) {
+    const found = [...totals.errors, ...totals.inhibits].filter((total) => total.kind === kind);
+    if (!found.length) continue;
+    parts.push(table(caption, ["name", "#times", "#time", "what it is, and the first step"], found.map((t) =>
       [t.code === null ? t.name : `${t.code} ${t.name}`, String(t.occurrences), duration(t.active),
-        t.texts.join("; ")])));
+        [t.sentence, ...t.texts.map((text) => `“${text}”`), ...t.steps].map((one) => make("div", {}, one))])));
   }
   return make("div", {}, make("h3", { class: "over" }, `Totals, vehicle ${vehicle.name}`),
     make("div", { class: "totals" }, ...parts));
@@ -632,11 +661,16 @@ class Changes { // every change as text, for search and for screen readers
     const name = row.title || row.id;
     const why = span.text ? `“${span.text}”` : [span.rule, span.source && `[${span.source}]`].filter(Boolean).join("  ");
     if (!row.reason) {
-      return [[span.start, row, `${name}: ${before ? `${before.value} → ` : ""}${span.value}`, why]];
+      return [[span.start, row, `${name}: ${before ? `${row.word(before)} → ` : ""}${row.word(span)}`, why]];
+    }
+    if (span.lost) {
+      const after = row.spans[span.index + 1], unsure = [span.start, row, `${name}: ${row.look(span).word}`, ""];
+      return after && after.start === span.end ? [unsure]
+        : [unsure, [span.end, row, `${name}: not reported since the link is back`, ""]];
     }
     const goesOn = before && before.end === span.start;
     const next = row.spans[span.index + 1];
-    const begins = [span.start, row, goesOn ? `${name} continues with another text` : `${name} begins`, why];
+    const begins = [span.start, row, goesOn ? `${name} ${before.lost ? "is reported again" : "continues with another text"}` : `${name} begins`, why];
     return next && next.start === span.end ? [begins] : [begins, [span.end, row, `${name} ends`, ""]];
   }
   add() {
@@ -660,17 +694,19 @@ const logs = DATA.logs.map((data) => new Log(data));
 let active = logs[0];
 main.append(...logs.map((log) => log.element));
 
-const sample = { id: "", on: "on", word: () => "" };
-for (const [value, words] of [["TRUE", "TRUE"], ["FALSE", "FALSE"], ["UNKNOWN", "UNKNOWN"], ["LOST", "link lost"]]) {
-  const svg = draw("svg", { width: 30, height: ROW, "aria-hidden": "true" });
-  svg.append(...figure(sample, { value, index: 0 }, 1, 28, 0).filter((made) => made.tagName !== "text"));
-  document.getElementById("legend").append(make("li", {}, svg, words));
+for (const name of FIELDS.filter((field) => DATA.looks[field])) {
+  const values = Object.entries(DATA.looks[name]).map(([value, { word, glyph, bar, tone }]) => {
+    const svg = draw("svg", { width: 22, height: ROW, "aria-hidden": "true" });
+    svg.append(box(`${bar} ${tone}`, 1, 20, ...FORMS[bar]));
+    return make("span", { class: "look", "data-value": value }, svg, `${glyph} ${word}`);
+  });
+  document.getElementById("legend").append(make("li", { "data-field": name }, make("b", {}, name), ...values));
 }
 const keys = [["wheel on the axis or Ctrl+wheel", "zoom"], ["drag", "move"], ["double click", "zoom to an interval"],
-  ["+ − 0", "zoom, whole flight"], ["← →", "move, or step through a focused row"]];
+  ["+ − 0", "zoom, whole log"], ["← →", "move, or step through a focused row"]];
 document.getElementById("footer").append(make("p", { class: "help" },
   ...keys.flatMap(([key, does]) => [make("kbd", {}, key), ` ${does}   `])), make("p", {}, `Made by ${DATA.by}. `
-  + "UNKNOWN is not FALSE. The status is information, not a safety function."));
+  + "Shares are of linked time, that of the link of the whole time. Unknown is not no: it may move. The status is information, not a safety function."));
 
 document.addEventListener("keydown", (event) => {
   if (!active || event.ctrlKey || event.metaKey || event.altKey || event.target.closest("button, summary, a")) return;
@@ -685,11 +721,10 @@ const resized = new ResizeObserver(() => logs.forEach((log) => log.redraw()));
 logs.forEach((log) => { resized.observe(log.utc.plot); log.redrawNow(); });
 matchMedia("print").addEventListener("change", () => logs.forEach((log) => log.redrawNow()));
 const views = new Map();
-addEventListener("beforeprint", () => { // print the whole flight
+addEventListener("beforeprint", () => { // print what the page opened on
   for (const log of logs) {
     views.set(log, [log.from, log.to]);
-    log.from = 0;
-    log.to = log.clock.length;
+    [log.from, log.to] = log.open;
     log.redrawNow();
   }
 });

@@ -1,5 +1,50 @@
-"""`watch`: a live table in the terminal. `render` turns a state into lines, rich adds colours, `show` runs the loop."""
+"""A live table in the terminal: on Textual if it is installed, else a plain one; in a pipe a line for each change."""
 
-from .show import show
+from __future__ import annotations
 
-__all__ = ["show"]
+import locale
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+
+from .log_lines import LogLines
+from .robots import Source
+from .text import Signs
+
+__all__ = ["Source", "is_screen", "show"]
+
+HINT = "Search, sorting, mouse: pip install 'mav-robot-status[watch]'; Ctrl-C: quit"
+NO_UTF8 = "Search, sorting and the mouse need a terminal with UTF-8; Ctrl-C: quit"
+
+
+def is_screen() -> bool:
+    """Whether standard input and output are a terminal with a movable cursor."""
+    return sys.stdin.isatty() and sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown", "")
+
+
+def show(source: Source, footer: Callable[[], Sequence[str]] | None = None) -> int:
+    """Show a source until it ends or the user quits; a signal raises KeyboardInterrupt. Returns the exit code.
+
+    `footer` gives the lines below the table instead of those of the log. The table is the plain one then.
+    """
+    utf8 = locale.nl_langinfo(locale.CODESET).upper().replace("-", "") == "UTF8"
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
+    signs = Signs(utf8)
+    if not is_screen():
+        from .plain import print_changes
+
+        print_changes(source, signs)
+        return 0
+    with LogLines().instead_of_stderr() as log:
+        if footer or not utf8 or find_spec("textual") is None:
+            from .plain import redraw
+
+            hint = HINT if utf8 else NO_UTF8
+            redraw(source, signs, footer or (lambda: (*[text for text, _ in list(log.lines)[-1:]], hint)))
+            return 0
+        from .app import run
+
+        return run(source, log, signs)

@@ -1,45 +1,57 @@
-"""Text in terminal cells: spans with a style name, clipped and padded to a width."""
+"""Text in terminal cells: spans with a style, clipped and padded to a width. Untrusted text is cleaned here."""
 
 from __future__ import annotations
 
 import unicodedata
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from collections.abc import Iterable, Iterator
+from datetime import datetime
+from typing import TYPE_CHECKING
 
+from ...language import TONES
 from ...streams import visible
+from ...values import NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-Style = Literal["", "soft", "bold", "head", "chosen", "on", "unknown", "stop", "alarm", "cause", "warning"]
-"""The meaning of a span. `paint` defines its look. The text alone has the same information."""
+    from ...language import Headline, Look, Tone
 
 
 class Span(NamedTuple):
     """Text of one style."""
 
     text: str
-    style: Style = ""
+    style: str = ""
+    """In rich's words: `bold cyan`. The text alone has the same information."""
 
 
 Line = tuple[Span, ...]
 
 
-class Glyphs(NamedTuple):
-    """The symbols, each one cell wide."""
+class Signs(NamedTuple):
+    """Which symbols a terminal can show."""
 
-    yes: str = "●"
-    no: str = "○"
-    unknown: str = "?"
-    chosen: str = "▶"
-    lost: str = "✗"
-    rule: str = "─"
-    more: str = "…"
     utf8: bool = True
 
+    def of(self, look: Look, width: int = 99) -> Span:
+        """A value: its symbol, its tone, and its word, which is the short one if the whole one does not fit."""
+        word = look.word if len(look.word) + 2 <= width else look.short or look.word
+        return toned(f"{self.symbol(look)} {word}", look.tone)
 
-UNICODE: Final = Glyphs()
-ASCII: Final = Glyphs("*", "-", "?", ">", "x", "-", "~", utf8=False)
-"""For a terminal without UTF-8."""
+    def symbol(self, look: Look | Headline) -> str:
+        """The symbol of a value or of a headline."""
+        return look.glyph if self.utf8 else look.ascii
+
+    def text(self, text: object) -> str:
+        """Untrusted text as this terminal can show it."""
+        known = clean(text)
+        if self.utf8 or known.isascii():
+            return known
+        known = known.replace("“", '"').replace("”", '"')
+        return "".join(c if c.isascii() else "?" * _cells(c) for c in known)
+
+
+def toned(text: str, tone: Tone) -> Span:
+    """Text in the colour of a tone."""
+    return Span(text, TONES[tone].terminal)
 
 
 def clean(text: object) -> str:
@@ -53,75 +65,65 @@ def clean(text: object) -> str:
 
 def cells(text: str) -> int:
     """The width of a clean text, in cells."""
-    return len(text) if text.isascii() else sum(_cells(character) for character in text)
+    return len(text) if text.isascii() else sum(map(_cells, text))
 
 
 def _cells(character: str) -> int:
     return 2 if unicodedata.east_asian_width(character) in "WF" else 1
 
 
-def head(text: str, width: int) -> str:
-    """The longest prefix of at most `width` cells."""
+def fill(text: str, width: int) -> str:
+    """The text in exactly `width` cells. A tilde shows a cut."""
+    if cells(text) > width:
+        room, text = width - 1, text + " "
+        end = next(i for i, _ in enumerate(text) if cells(text[: i + 1]) > room)
+        text = text[:end] + "~"
+    return text + " " * (width - cells(text))
+
+
+def padded(span: Span, width: int) -> Line:
+    """A span in exactly `width` cells. The spaces after its text, at least one, have no style."""
+    text = fill(span.text.rstrip(), width - 1).rstrip()
+    return Span(text, span.style), Span(" " * (width - cells(text)))
+
+
+def wrap(line: Line, width: int) -> Iterator[Line]:
+    """The words of a line in lines of at most `width` cells. The later ones begin with two spaces."""
+    words = [Span(part, span.style) for span in line for part in _words(span.text)]
+    shown: list[Span] = []
     room = width
-    for i, character in enumerate(text):
-        room -= _cells(character)
-        if room < 0:
-            return text[:i]
-    return text
+    for word in words:
+        if cells(word.text.rstrip()) > room and shown:
+            yield tuple(shown)
+            shown, room = [Span("  ")], width - 2
+        text = word.text if cells(word.text) <= room else fill(word.text.rstrip(), room).rstrip()
+        shown.append(Span(text, word.style))
+        room = max(0, room - cells(text))
+    yield tuple(shown)
 
 
-def clip(text: str, width: int, glyphs: Glyphs = UNICODE) -> str:
-    """The text in at most `width` cells. A mark shows a cut."""
-    if cells(text) <= width:
-        return text
-    return head(text, width - 1) + glyphs.more if width > 0 else ""
+def _words(text: str) -> Iterable[str]:
+    """Each word with the spaces after it."""
+    begin = 0
+    for i in range(1, len(text)):
+        if text[i - 1] == " " and text[i] != " ":
+            yield text[begin:i]
+            begin = i
+    yield text[begin:]
 
 
-def fill(text: str, width: int, glyphs: Glyphs = UNICODE) -> str:
-    """The text in exactly `width` cells."""
-    clipped = clip(text, width, glyphs)
-    return clipped + " " * (width - cells(clipped))
+def clock(stamp: str) -> str:
+    """The time of day of an RFC 3339 stamp, in the time zone of this computer; the stamp, if it is none."""
+    try:
+        return f"{datetime.fromisoformat(stamp.replace('Z', '+00:00')).astimezone():%H:%M:%S}"
+    except (ValueError, OverflowError):
+        return stamp
 
 
-def fill_line(spans: Iterable[Span], width: int, glyphs: Glyphs = UNICODE) -> Line:
-    """The spans in exactly `width` cells."""
-    line: list[Span] = []
-    room = width
-    for text, style in spans:
-        if room <= 0:
-            break
-        clipped = clip(text, room, glyphs) if text.strip() else text[:room]
-        line.append(Span(clipped, style))
-        room -= cells(clipped)
-        if clipped != text:
-            break
-    return (*line, Span(" " * room)) if room > 0 else tuple(line)
-
-
-def wrap(text: str, width: int) -> Iterator[str]:
-    """The text in lines of at most `width` cells, broken at spaces where possible."""
-    line = ""
-    for word in text.split(" "):
-        if line and cells(line) + 1 + cells(word) <= width:
-            line += " " + word
-            continue
-        if line:
-            yield line
-        while cells(word) > width > 1:
-            part = head(word, width)
-            yield part
-            word = word[len(part) :]
-        line = word
-    yield line
-
-
-def plain(line: Line) -> str:
-    """The line without its styles."""
-    return "".join(span.text for span in line)
-
-
-def encode(text: str, glyphs: Glyphs) -> bytes:
-    """The bytes for the terminal. They have the width of the text."""
-    if glyphs.utf8:
-        return text.encode("utf-8", "replace")
-    return "".join(c if c.isascii() else "?" * _cells(c) for c in text).encode("ascii")
+def duration(seconds: float) -> str:
+    """`12s`, `3m`, `5h`, `2d`: at most four characters up to 27 years."""
+    whole = max(0, int(seconds))
+    for unit, size, most in (("s", 1, 100), ("m", 60, 100), ("h", 3600, 48)):
+        if whole < size * most:
+            return f"{whole // size}{unit}"
+    return f"{whole // 86400}d"

@@ -5,18 +5,23 @@ from __future__ import annotations
 import json
 import pathlib
 import socket
-import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import closing
 
 import pytest
 
 from bench import workload
-from bench.__main__ import CASES
+from bench.__main__ import CASES, main
+from bench.case import Bench, Case
+from bench.contenders import FILTERED, Contenders, version_of
 from bench.feed import Feed
 from bench.process import BenchError, Child, drained, free_port, queue
+from bench.report import BEGIN, END, into, render
+from bench.results import FIRST_MACHINE, OURS, Sample, Skip, Target
 from bench.sender import Sender
 
-from ...docs.documents import ROOT
+from ...deadline import SOON, wait_until
 
 
 @pytest.fixture
@@ -27,23 +32,90 @@ def receiver() -> socket.socket:
     return made
 
 
-def bench(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "bench", *arguments], cwd=ROOT, capture_output=True, text=True, timeout=120, check=True
-    )
+def test_the_list_has_every_case_or_the_selected_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--list"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(CASES)
+    assert main(["--list", "--only", "parse"]) == 0
+    assert capsys.readouterr().out.split()[0] == "parse"
 
 
-def test_the_list_has_every_case_or_the_selected_ones() -> None:
-    assert [line.split()[0] for line in bench("--list").stdout.splitlines()] == list(CASES)
-    assert bench("--list", "--only", "parse").stdout.split()[0] == "parse"
-
-
-def test_a_run_writes_the_same_results_as_a_table_and_as_json(tmp_path: pathlib.Path) -> None:
-    done = bench("--quick", "--rounds", "2", "--only", "parse", "--out", str(tmp_path))
-    assert done.stdout == (tmp_path / "results.md").read_text()
+def test_a_run_writes_the_same_results_as_a_table_and_as_json(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    only_tiny(monkeypatch)
+    assert main(["--rounds", "2", "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    assert shown == (tmp_path / "results.md").read_text()
     (case,) = json.loads((tmp_path / "results.json").read_text())["cases"]
-    assert [row["setup"] for row in case["rows"]] == ["chunks of 1400 bytes", "frame by frame"]
-    assert all(len(row["values"]["ours"]) == len(row["values"]["pymavlink"]) == 2 for row in case["rows"])
+    assert case["rows"] == [{"setup": "a setup", "metric": "time, us", "values": {"ours": [100, 100]}}]
+    assert case["notes"] == ["ours: no such program"]
+    assert "| at most 0.1 ms | 100 us (limit here 1,000) | yes |" in shown
+
+
+def test_a_run_writes_the_tables_into_a_page(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    only_tiny(monkeypatch)
+    monkeypatch.setattr("bench.__main__.RESULTS", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{BEGIN}{END}after\n")
+    assert main(["--rounds", "1", "--write", str(page), "--busy", "tests"]) == 0
+    text = page.read_text()
+    assert text.startswith("before\n")
+    assert "The machine is busy: tests." in text
+    assert text == into(text, render(json.loads((tmp_path / "results.json").read_text())))
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "said"),
+    [
+        ("no marks\n", (), "the page lacks the lines <!-- results --> and <!-- end of results -->"),
+        (f"{BEGIN}{END}", ("--only", "parse"), "--write needs a whole run: leave out --only"),
+    ],
+)
+def test_a_page_that_cannot_take_the_tables_is_an_error_before_the_run(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str], text: str, arguments: tuple[str, ...], said: str
+) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(text)
+    with pytest.raises(SystemExit):
+        main(["--write", str(page), *arguments])
+    assert said in capsys.readouterr().err
+
+
+def only_tiny(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bench with one case, which takes no time, on a machine ten times slower than that of its target."""
+
+    def measure(_: Bench) -> Iterator[Sample | Skip]:
+        yield Sample("a setup", "time, us", OURS, 100)
+        raise BenchError("no such program")
+
+    target = Target("a setup", "time, us", "at most 0.1 ms", 100.0, machine=FIRST_MACHINE)
+    monkeypatch.setattr("bench.__main__.CASES", {"tiny": Case("tiny", "", measure, (target,))})
+    monkeypatch.setattr("bench.cases.parse.speed", lambda _: 10 * FIRST_MACHINE)
+
+
+@pytest.mark.parametrize(("known", "measured"), [(True, [OURS, FILTERED]), (False, [OURS])])
+def test_the_kernel_filter_is_skipped_by_name_if_this_version_lacks_it(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, known: bool, measured: list[str]
+) -> None:
+    with closing(Contenders(tmp_path, {})) as contenders:
+        monkeypatch.setattr(contenders, "has_option", lambda _: known)
+        skipped: list[Skip] = []
+        assert list(contenders.each([OURS, FILTERED], skipped)) == measured
+    lacks = Skip("", FILTERED, "this version lacks it")
+    assert skipped == ([] if known else [lacks])
+
+
+@pytest.mark.parametrize(
+    ("text", "version"),
+    [
+        ("mavlink-router version v4-8-g12ab", "4-8-g12ab"),
+        ("mavlink-router version 4", "4"),
+        ("MAVProxy is a modular ground station\nMAVProxy Version: 1.8.75", "1.8.75"),
+        ("no such option", "unknown"),
+    ],
+)
+def test_the_version_of_a_program_is_read_from_its_output(text: str, version: str) -> None:
+    assert version_of(["echo", text]) == version
 
 
 @pytest.mark.parametrize("rate", [4000, 40_000])  # one frame a system call, and several frames a call
@@ -54,6 +126,17 @@ def test_frames_are_sent_in_order_in_a_loop(receiver: socket.socket, rate: int) 
         sent, _ = sender.run(rate, 40 / rate)
         sender.close()
         assert [receiver.recv(300) for _ in range(sent)] == (frames * 3)[:40]
+
+
+def test_a_burst_is_sent_at_once_and_the_bursts_are_evenly_spaced(receiver: socket.socket) -> None:
+    with receiver:
+        sender = Sender(workload.frames(16), receiver.getsockname()[1])
+        sent, took = sender.run(100, 0.16, 8)
+        sender.close()
+        assert sent == 16
+        assert took >= 0.16  # the pause after the last burst too
+        receiver.setblocking(False)
+        assert len([receiver.recv(300) for _ in range(16)]) == 16
 
 
 def test_dropped_and_waiting_datagrams_are_read_from_the_kernels_table(receiver: socket.socket) -> None:
@@ -82,6 +165,17 @@ def test_a_process_that_listens_is_fed_and_measured(tmp_path: pathlib.Path) -> N
         assert (fed.sent, fed.lost) == (200, 0)
         assert 0 < fed.cpu < 5
         assert child.memory() > 1
+
+
+def test_wake_ups_and_peak_memory_are_read_from_the_kernel() -> None:
+    code = "import time\nfor _ in range(5): time.sleep(0.001)\nx = b'x' * 60_000_000\ndel x\ntime.sleep(0.2)"
+    with Child([sys.executable, "-c", code]) as child:
+        assert 60 < child.peak_memory(20.0) < 120
+    with Child([sys.executable, "-c", "input()"]) as child, pytest.raises(BenchError, match="EOF"):
+        child.peak_memory(20.0)
+    with Child([sys.executable, "-c", "import time\nwhile True: time.sleep(0.001)"]) as child:
+        before = child.wake_ups()
+        wait_until(lambda: child.wake_ups() > before + 20, SOON, "wake-ups")
 
 
 def test_a_process_that_ends_at_once_is_an_error_with_its_output() -> None:

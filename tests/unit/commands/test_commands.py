@@ -8,7 +8,7 @@ import pytest
 from mav_robot_status import commands
 from mav_robot_status.commands import COMMANDS, command
 
-SHARED = {"__init__", "options", "overrides"}
+SHARED = {"__init__", "arms", "options", "overrides"}
 
 
 def test_every_row_has_a_module_and_every_module_has_a_row() -> None:

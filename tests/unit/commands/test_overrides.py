@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 import pytest
 
-from mav_robot_status.commands.options import given
-from mav_robot_status.commands.overrides import configured, only, overridden, with_publisher
+from mav_robot_status.commands.options import WITH_ARGUMENTS, given, may_name, options_of
+from mav_robot_status.commands.overrides import configured, loaded, only, overridden, with_publisher
 from mav_robot_status.config import Config, ControllerConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
 from mav_robot_status.errors import UsageError
 from mav_robot_status.publishers.mqtt.options import BrokerOptions
@@ -118,10 +119,20 @@ def test_a_page_option_adds_a_publisher() -> None:
     assert with_publisher("http", (SLOW,), said("demo")) == (SLOW,)
 
 
+def test_the_port_for_ros_industrial_is_an_option_of_run_and_demo() -> None:
+    asked = PublisherConfig("simple_message", {"host": ":11002"})
+    assert overridden(Config(controllers=(SLOW,)), run("--simple-message", ":11002")).controllers[0].publishers == (
+        PublisherConfig("mavlink"),
+        asked,
+    )
+    (changed,) = with_publisher("simple_message", (SLOW,), said("demo", "--simple-message", ":11002"))
+    assert changed.publishers == (PublisherConfig("mavlink"), asked)
+
+
 def test_the_board_has_the_same_options_except_those_of_a_gateway() -> None:
-    options = said("board", "mqtts://b/robots", "--mqtt-user", "u", "--http-token-file", "t")
+    options = said("board", "mqtts://b/robots", "--mqtt-user", "u", "--http-token-file", "t", "--alarm")
     assert given(options, BrokerOptions) == {"url": "mqtts://b/robots", "user": "u"}
-    assert given(options, HttpOptions) == {"listen": "127.0.0.1:8765", "token_file": "t"}
+    assert given(options, HttpOptions) == {"listen": "127.0.0.1:8765", "token_file": "t", "alarm": True}
 
 
 @pytest.mark.parametrize(
@@ -147,3 +158,44 @@ def test_an_option_of_an_unused_publisher_is_a_usage_error(arguments: tuple[str,
 def test_a_missing_connection_is_an_error_with_an_example_command(name: str, example: str) -> None:
     with pytest.raises(UsageError, match=f"no connection given; write for example {example}"):
         configured(said(name))
+
+
+def test_the_table_of_px4s_events_replaces_that_of_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "site.yaml"
+    file.write_text("hardware: {px4_events: of-the-file.json, v_on: 1}\n")
+    assert loaded(run("--config", str(file))).hardware.px4_events == "of-the-file.json"
+    for command in ("run", "watch", "explain", "doctor"):
+        hardware = loaded(said(command, "--config", str(file), "--px4-events", "mine.json")).hardware
+        assert (hardware.px4_events, hardware.v_on) == ("mine.json", 1.0)
+    assert loaded(said("report", "flight.tlog", "--px4-events", "mine.json")).hardware.px4_events == "mine.json"
+
+
+@pytest.mark.parametrize("command", ["run", "explain", "doctor", "watch", "report"])
+def test_names_of_the_command_line(command: str) -> None:
+    options = said(command, "x.tlog", "--name", "1=Rover-A", "--name", "2.3=a=b")
+    assert loaded(options).names == {(1, None): "Rover-A", (2, 3): "a=b"}
+
+
+def test_a_name_of_the_command_line_replaces_that_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "names.yaml"
+    path.write_text("vehicles: [{system: 1, name: old}, {system: 2, name: B}]")
+    assert loaded(run("--config", str(path), "--name", "1=new")).names == {(1, None): "new", (2, None): "B"}
+
+
+def test_one_vehicle_has_one_name() -> None:
+    with pytest.raises(UsageError, match=r"--name 1\.2= is there twice: one vehicle has one name"):
+        loaded(run("--name", "1.2=a", "--name", "1.2=b"))
+
+
+def test_a_publisher_is_declared_if_an_argument_may_name_one_of_its_flags() -> None:
+    for words in (["--mqtt", "u"], ["--mqtt-user=x"], ["--mq", "u"], ["--m", "1"], ["-h"], ["--he"], ["-qh"], ["--"]):
+        assert may_name("--mqtt", words), words
+    for words in ([], ["mqtt:h"], ["--max-gap", "1"], ["-q"], ["--http", ":1"], ["--record=h"]):
+        assert not may_name("--mqtt", words), words
+
+
+def test_every_flag_of_a_publisher_begins_as_the_table_says() -> None:
+    for kind, (beginnings, _, _) in WITH_ARGUMENTS.items():
+        flags = [one.option.flag for one in options_of(kind).declared() if one.option.flag]
+        assert flags[0] == beginnings[0]
+        assert all(flag.startswith(beginnings) for flag in flags)

@@ -17,6 +17,7 @@ from .said import said
         (("--out", "127.0.0.1:1"), "replayed alone"),
         (("--http", ":0"), "write `mav-robot-status report a.tlog`"),
         (("--mqtt", "mqtt://b/x"), "without --mqtt"),
+        (("--simple-message", ":0"), "without --simple-message"),
         (("--record", "x"), "without --record and --forward"),
         (("--forward",), "without --record and --forward"),
         (("udp:nowhere",), "udp:nowhere"),

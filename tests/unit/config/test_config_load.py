@@ -143,7 +143,8 @@ hardware:
   v_off_disarmed: 1.5
   mode_overrides: {copter: {77: AUTO, 78: MANUAL}, other: {4294967295: UNKNOWN}}
   ignore_sensors: [3D_MAG, LEAK]
-  request_events: true
+  request_events: false
+  px4_events: events.json
 """
     hardware = loaded(tmp_path, text).hardware
     assert hardware == HardwareOptions(
@@ -166,7 +167,8 @@ hardware:
             "other": {4294967295: RobotMode.UNKNOWN},
         },
         ignore_sensors=frozenset({"3D_MAG", "LEAK"}),
-        request_events=True,
+        request_events=False,
+        px4_events="events.json",
     )
     assert isinstance(hardware.heartbeat_timeout, float)
     default = HardwareOptions()
@@ -317,3 +319,45 @@ def test_a_hardware_list_holds_the_mavlink_options_and_the_other_interfaces(tmp_
 def test_mavlink_is_received_with_links_or_without_other_interfaces(tmp_path: Path) -> None:
     links, arm = "links: ['udp:127.0.0.1:1']\n", "hardware: [{type: ur}]\n"
     assert [loaded(tmp_path, text).hears_mavlink for text in ("", links, links + arm, arm)] == [True, True, True, False]
+
+
+def test_the_time_out_of_a_link_is_read_and_described(tmp_path: Path) -> None:
+    file = tmp_path / "satellite.yaml"
+    file.write_text(
+        'links: [{url: "udp:127.0.0.1:14550", heartbeat_timeout: 120 s, passive: true}, "udp:127.0.0.1:1"]\n'
+    )
+    config = load(str(file))
+    assert [link.heartbeat_timeout for link in config.links] == [120.0, None]
+    assert describe(config)[0] == (
+        "link: listening on 127.0.0.1:14550/udp (passive: nothing is sent there; "
+        "a vehicle there is lost after 120 s without a heartbeat)"
+    )
+
+
+def test_entries_that_only_name_vehicles_expect_none(tmp_path: Path) -> None:
+    path = tmp_path / "names.yaml"
+    path.write_text("vehicles: [{system: 1, name: Rover-A}, {system: 2, component: 3, name: Copter B}]")
+    config = load(path)
+    assert config.vehicles == ()
+    assert config.names == {(1, None): "Rover-A", (2, 3): "Copter B"}
+    assert "vehicle: every autopilot that is heard, each with a handle of its own" in describe(config)
+    assert "name: system 2, component 3 is called 'Copter B'" in describe(config)
+
+
+def test_an_expected_vehicle_can_have_a_name(tmp_path: Path) -> None:
+    path = tmp_path / "names.yaml"
+    path.write_text("vehicles: [{system: 1, handle: rover, name: Rover-A}, {handle: boat, name: none}]")
+    config = load(path)
+    assert config.vehicles == (VehicleConfig(1, None, "rover", "Rover-A"), VehicleConfig(None, None, "boat"))
+    assert "vehicle: system 1, any autopilot component -> handle 'rover', called 'Rover-A'" in describe(config)
+
+
+def test_a_mode_can_be_overridden_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "modes.yaml"
+    path.write_text(
+        "hardware: {mode_overrides: {rover: {GUIDED: MANUAL, hold: UNKNOWN, 77: AUTO}, px4: {AUTO.MISSION: MANUAL}}}"
+    )
+    assert load(path).hardware.mode_overrides == {
+        "rover": {15: RobotMode.MANUAL, 4: RobotMode.UNKNOWN, 77: RobotMode.AUTO},
+        "px4": {4 << 16 | 4 << 24: RobotMode.MANUAL},
+    }

@@ -192,7 +192,23 @@ def test_the_table_has_one_aligned_row_for_each_field(tmp_path: Path) -> None:
     assert rows[2][: heading.index("why")].endswith("  0.5 s  ")
     assert rows[4][: heading.index("why")].split() == ["in_motion", "UNKNOWN"]  # no message was read, so it has no age
     assert rows[6] == "applet   not heard: docs/ardupilot-applet.md"
-    assert [row.split()[:2] for row in rows[7:]] == [["inhibit", i["name"]] for i in found[0]["inhibits"]]
+    causes = [row.split()[:2] for row in rows[7:] if not row.startswith("step")]
+    assert causes == [["inhibit", i["name"]] for i in found[0]["inhibits"]]
+
+
+def test_a_cause_is_followed_by_its_step_which_is_named_once(tmp_path: Path) -> None:
+    (found,) = explain_log(Config(), log_of(tmp_path / "a.tlog", 0, 1), "+0.5")
+    since = found["stamp"]
+    failing = [{"name": "PREARM_FAILING", "text": f"PreArm: GPS {n}: Bad fix", "since": since} for n in (1, 2)]
+    low = {"code": 2003, "name": "BATTERY_LOW", "text": None, "since": since}
+    rows = as_table([found | {"errors": [low], "inhibits": failing}])
+    assert rows[9:] == [
+        f"error    2003 BATTERY_LOW since {since}",
+        "step     Bring it back or land it. Charge or change the battery.",
+        f'inhibit  PREARM_FAILING since {since}: "PreArm: GPS 1: Bad fix"',
+        "step     Wait for a fix or check the antenna.",
+        f'inhibit  PREARM_FAILING since {since}: "PreArm: GPS 2: Bad fix"',
+    ]
 
 
 # -- the applet --------------------------------------------------------------------------------------------------------
@@ -243,6 +259,7 @@ def test_the_applet_is_not_mentioned_for_another_autopilot(tmp_path: Path) -> No
 
 def test_a_live_vehicle_is_explained_some_time_after_its_first_heartbeat(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mav_robot_status.diagnosis.explain.LISTEN", 0.3)
+    monkeypatch.setattr("mav_robot_status.diagnosis.explain.ANSWERS", 0.3)
     with FakeAutopilot(ardurover.READY) as rover:
         links = (LinkConfig("udpout:{}:{}".format(*rover.address)),)
         stdout = io.StringIO()

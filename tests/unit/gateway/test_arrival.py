@@ -216,3 +216,17 @@ def test_time_does_not_go_back_for_a_datagram_that_was_left_for_a_later_read() -
     assert gate.state == (LinkState.LOST, -1)
     gate.look(later(NOW, 0.1))
     assert gate.state == (LinkState.LOST, -1)
+
+
+def test_a_frame_that_waits_does_not_bring_back_a_vehicle_whose_link_is_closed() -> None:
+    beats = [Received(beat(False), "a")], [Dated(beat(False), "a", stamp(19.9))]
+    kept, closed = FakeDatedLink(stream=False), FakeDatedLink(*beats, stream=False)
+    gate = Gateway(kept, closed)
+    gate.look(SINCE)
+    assert gate.state == (LinkState.CONNECTED, 0)
+    gate.hardware.hub.pause(SINCE, NOW, stalled=True)
+    LinkSource(gate.hardware.hub.endpoints[1], gate.hardware).receive(NOW, 1024)
+    one = Config(links=(LinkConfig("udpin:127.0.0.1:0"),), requests="none", vehicles=(VehicleConfig(1, 1),))
+    gate.hardware.change(one)
+    gate.hardware.read(NOW)
+    assert gate.state == (LinkState.NEVER_SEEN, -1)

@@ -8,7 +8,7 @@ from contextlib import closing
 
 import pytest
 
-from mav_robot_status.config import Config, HardwareConfig, LinkConfig
+from mav_robot_status.config import Config, HardwareConfig, LinkConfig, PublisherConfig
 from mav_robot_status.errors import LinkError
 from mav_robot_status.gateway import plugins
 from mav_robot_status.gateway.background import BackgroundGateway, Rates, on_a_board
@@ -143,3 +143,10 @@ def test_a_message_that_no_longer_arrives_has_no_rate() -> None:
     assert rates.at(5.0) == {"SYS_STATUS": 1.0}
     assert rates.at(9.0) == {}
     assert Rates().at(0.0) == {}
+
+
+def test_other_publishers_can_stand_beside_the_board() -> None:
+    (controller,) = on_a_board(HERE, [PublisherConfig("http", {"listen": "127.0.0.1:0"})]).controllers
+    assert [publisher.type for publisher in controller.publishers or ()] == ["board", "http"]
+    (alone,) = on_a_board(HERE).controllers
+    assert [publisher.type for publisher in alone.publishers or ()] == ["board"]

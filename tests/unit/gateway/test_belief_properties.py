@@ -11,8 +11,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from fuzz import belief
 from fuzz.belief import FATES, OTHER, PAUSES, TRUE_ONE, UnsafeError, World
-from mav_robot_status.hardware.mavlink import interface, settle
+from mav_robot_status.hardware.mavlink import interface
 from mav_robot_status.hardware.mavlink.facts import Claimed
+from mav_robot_status.hardware.mavlink.settle import table
 from mav_robot_status.hardware.mavlink.state import claims
 
 SENDERS = st.sampled_from((TRUE_ONE, OTHER))
@@ -22,10 +23,12 @@ SENT_AS = st.sampled_from(sorted(set(FATES)))
 class TwoSenders(RuleBasedStateMachine):
     """The steps of `World`; its oracle is the invariant."""
 
+    world_type = World
+
     @initialize()
     def begin(self) -> None:
         logging.disable(logging.WARNING)
-        self.world = World()
+        self.world = self.world_type()
 
     @rule(seconds=st.sampled_from(PAUSES))
     def wait(self, seconds: float) -> None:
@@ -85,10 +88,10 @@ def test_random_steps_find_no_unsafe_status_and_the_same_seed_takes_the_same_ste
 
 def test_the_simulation_finds_a_gateway_that_does_not_compare_its_senders(monkeypatch: pytest.MonkeyPatch) -> None:
     def believe(*_: object) -> Claimed:
-        return settle.UNDISPUTED
+        return table.UNDISPUTED
 
-    monkeypatch.setitem(settle.SETTLE, "claimed", believe)
-    monkeypatch.setattr(settle, "_ALL", tuple(settle.SETTLE.values()))
+    monkeypatch.setitem(table.SETTLE, "claimed", believe)
+    monkeypatch.setattr(table, "_ALL", tuple(table.SETTLE.values()))
     found = belief.run(20_000, seed=1)
     assert found is not None
     assert "world = World()" in found

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import json
 import logging
@@ -82,7 +83,40 @@ def test_every_detected_autopilot_gets_its_own_handle_and_controller(stdout: Tex
     take(pipeline, heartbeat(9), START)
     pipeline.tick(START)
     pipeline.close(START)
-    assert [line["handle"] for line in lines(stdout)] == [NAME, f"{NAME}/9.1"]
+    assert [line["handle"] for line in lines(stdout)] == [f"{NAME}/7.1", f"{NAME}/9.1"]
+
+
+def test_a_vehicle_whose_handle_no_controller_reads_is_told_once(
+    stdout: TextIO, caplog: pytest.LogCaptureFixture
+) -> None:
+    pasted = dataclasses.replace(DEFAULT_CONTROLLER, where="robot.yaml:1:1", publishers=(PublisherConfig("json"),))
+    pipeline = made(Config(controllers=(pasted,)), Port(HEARER), stdout)
+    for system in (1, 7, 9):
+        take(pipeline, heartbeat(system), START)
+    pipeline.tick(START)
+    pipeline.close(START)
+    assert [line["handle"] for line in lines(stdout)] == [NAME]
+    (told,) = [record.message for record in caplog.records if "no controller reads" in record.message]
+    assert f"handle_name: {NAME}/7.1" in told
+    assert "vehicles: [{system: 7}]" in told
+
+
+def test_a_controller_can_read_the_handle_of_a_vehicle_that_is_not_configured(stdout: TextIO) -> None:
+    publishers = (PublisherConfig("json"),)
+    seven = ControllerConfig("seven", DEFAULT_CONTROLLER.type, {"handle_name": f"{NAME}/7.1"}, "f:1:1", publishers)
+    pipeline = made(Config(controllers=(seven,)), Port(HEARER), stdout)
+    for system in (1, 7, 9):
+        take(pipeline, heartbeat(system), START)
+    pipeline.tick(START)
+    pipeline.close(START)
+    assert [line["system"] for line in lines(stdout)] == [7]
+
+
+@pytest.mark.parametrize("ids", ["1.1", "0.1", "7.256", "7", "07.1"])
+def test_a_handle_that_no_vehicle_gets_is_an_error(ids: str) -> None:
+    stanza = ControllerConfig("status", DEFAULT_CONTROLLER.type, {"handle_name": f"{NAME}/{ids}"}, "f:1:1")
+    with pytest.raises(ConfigError, match="f:1:1: there is no handle"):
+        check(Config(controllers=(stanza,)))
 
 
 def test_expected_vehicles_are_published_before_their_first_heartbeat(stdout: TextIO) -> None:
@@ -101,6 +135,29 @@ def test_the_pipeline_is_due_only_as_often_as_it_has_work(stdout: TextIO) -> Non
     pipeline.tick(START)
     assert live(pipeline, START, 5.0) < 5 * (10 + 10) + 20  # the lines, the hardware reads and a few more
     pipeline.close(START)
+
+
+def test_if_nobody_takes_periodic_messages_the_pipeline_sleeps_until_an_audience_gets_a_present_status(
+    stdout: TextIO,
+) -> None:
+    port = Port()
+    publishers = PublisherConfig("json", {"changes_only": True}), PublisherConfig("mavlink")
+    pipeline = made(Config(controllers=(controller("c", OURS, *publishers),)), port, stdout)
+    take(pipeline, heartbeat(), START)
+    pipeline.tick(START)
+    live(pipeline, START, 10.0)
+    silent = later(START, 10.0)
+    assert live(pipeline, silent, 30.0) <= 30
+    now = later(START, 40.0)
+    port.present = [HEARER]
+    pipeline.tick(now)
+    assert pipeline.next_due(now.mono) == now.mono
+    pipeline.tick(now)
+    assert live(pipeline, now, 5.0) >= 5
+    times = [sent.message.time_usec - START.unix_us for sent in port.sent if sent.message._fields[0] == "time_usec"]
+    assert times[0] == pytest.approx(40.0e6, abs=0.2e6)
+    assert len(times) == pytest.approx(6, abs=1)
+    pipeline.close(now)
 
 
 def test_a_controller_is_updated_only_when_its_handle_changes_or_it_is_due(

@@ -11,9 +11,10 @@ from mav_robot_status.config import Config, VehicleConfig
 from mav_robot_status.errors import UsageError
 from mav_robot_status.gateway.recorded_log import Recording
 from mav_robot_status.gateway.replay import ReplayPipeline, replay, run_through
+from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.links.log import Stamped
-from mav_robot_status.mavlink.definitions import Heartbeat, NamedValueInt
+from mav_robot_status.mavlink.definitions import Attitude, GlobalPositionInt, Heartbeat, NamedValueInt, VfrHud
 from mav_robot_status.mavlink.encode import encode
 
 START_US = 1_800_000_000_000_000
@@ -118,3 +119,29 @@ def test_an_expected_vehicle_has_lines_from_the_start_even_if_it_never_appears(t
 def test_a_missing_log_is_a_user_error(tmp_path: Path, stdout: TextIO) -> None:
     with pytest.raises(UsageError, match="cannot read the log"):
         replay(Config(), str(tmp_path / "missing.tlog"), stdout)
+
+
+def test_a_steady_stream_settles_no_facts(tmp_path: Path, stdout: TextIO, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "steady.tlog"
+    with path.open("wb") as log:
+        for number in range(200):
+            boot_ms = 60_000 + number * 50
+            position = GlobalPositionInt(boot_ms, 1, 1, 300, 0, 0)
+            messages: list[Any] = [Attitude(boot_ms, 0.0, 0.0, 0.5), position, VfrHud(3.0, 0.0, 40)]
+            if number % 20 == 0:
+                messages.append(Heartbeat(0, 10, 3, 193, 4, 3))
+            for message in messages:
+                log.write((START_US + number * 50_000).to_bytes(8, "big"))
+                log.write(encode(message, system=1, component=1, sequence=0))
+    settled: list[float] = []
+    settle = MavlinkRobotHW._settle
+
+    def counting(self: MavlinkRobotHW, *values: Any) -> None:
+        settled.append(values[-1].mono)
+        settle(self, *values)
+
+    monkeypatch.setattr(MavlinkRobotHW, "_settle", counting)
+    run_through(pipeline_of(stdout), Recording(str(path)))
+    late = [at for at in settled if at > 2.0]
+    assert settled
+    assert len(late) <= 10, "only the heartbeats, of 480 messages"

@@ -55,6 +55,12 @@ class LiveOnly(Collecting):
     live_only = True
 
 
+class OneHandle(Collecting):
+    """A third-party publisher whose receivers cannot tell whose status they get."""
+
+    one_handle = True
+
+
 class Durable(Collecting):
     """A durable third-party publisher."""
 
@@ -98,6 +104,7 @@ POINTS = {
     plugins.PUBLISHERS: [
         Point("collecting", Collecting),
         Point("live only", LiveOnly),
+        Point("one handle", OneHandle),
         Point("durable", Durable),
         Point("shown", Shown),
     ],

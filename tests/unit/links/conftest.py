@@ -27,7 +27,8 @@ class Names:
         for module in (udp, tcp):
             monkeypatch.setattr(module, "CHECK_AGAIN", 0.0)
 
-    def _getaddrinfo(self, host: str, *args: Any, flags: int = 0, **options: Any) -> Any:
+    def _getaddrinfo(self, name: bytes, *args: Any, flags: int = 0, **options: Any) -> Any:
+        host = name.decode()
         if not host.endswith(".test") or flags & socket.AI_NUMERICHOST:
             return self._really(host, *args, flags=flags, **options)
         self.lookups += 1

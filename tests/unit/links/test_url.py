@@ -34,6 +34,24 @@ NETWORK = [
     ("tcpin:0.0.0.0:5760", "tcpin", "0.0.0.0", 5760),
     ("tcpin://:5760", "tcpin", "0.0.0.0", 5760),
     ("tcpin:127.0.0.1:0", "tcpin", "127.0.0.1", 0),
+    (":14550", "udpin", "0.0.0.0", 14550),
+    ("udp:14550", "udpin", "0.0.0.0", 14550),
+    ("udpin:14550", "udpin", "0.0.0.0", 14550),
+    ("tcpin:5760", "tcpin", "0.0.0.0", 5760),
+    # BlueOS, mavlink-server
+    ("udpserver:0.0.0.0:14550", "udpin", "0.0.0.0", 14550),
+    ("udpserver://0.0.0.0:14550", "udpin", "0.0.0.0", 14550),
+    ("udpserver:14550", "udpin", "0.0.0.0", 14550),
+    ("udpclient:192.168.2.1:14550", "udpout", "192.168.2.1", 14550),
+    ("udpclient://192.168.2.1:14550", "udpout", "192.168.2.1", 14550),
+    ("tcpserver:0.0.0.0:5760", "tcpin", "0.0.0.0", 5760),
+    ("tcpserver://[::]:5760", "tcpin", "::", 5760),
+    ("tcpclient:127.0.0.1:5760", "tcp", "127.0.0.1", 5760),
+    ("tcpclient://rover.local:5760", "tcp", "rover.local", 5760),
+    # hosts that look a little like a scheme
+    ("server:14550", "udpout", "server", 14550),
+    ("tcp1:5760", "udpout", "tcp1", 5760),
+    ("mqtt:14550", "udpout", "mqtt", 14550),
 ]
 
 
@@ -52,6 +70,11 @@ def test_a_network_form_is_understood(text: str, kind: str, host: str, port: int
         ("serial:///dev/ttyUSB0:57600", "/dev/ttyUSB0", 57600),
         ("serial:///dev/ttyUSB0", "/dev/ttyUSB0", 57600),
         ("serial:/dev/ttyUSB0,9600", "/dev/ttyUSB0", 9600),
+        ("serial:/dev/ttyUSB0:115200", "/dev/ttyUSB0", 115200),
+        ("serial:///dev/ttyACM0?baudrate=115200", "/dev/ttyACM0", 115200),
+        ("/dev/ttyUSB0:115200:8N1", "/dev/ttyUSB0", 115200),
+        ("/dev/ttyUSB0,115200,8n1", "/dev/ttyUSB0", 115200),
+        ("/dev/ttyUSB0:8N1", "/dev/ttyUSB0", 57600),
         ("/dev/serial/by-id/usb-Holybro_0-if00", "/dev/serial/by-id/usb-Holybro_0-if00", 57600),
         ("/dev/serial/by-path/pci-0:00:14.0-usb-0:1:1.0", "/dev/serial/by-path/pci-0:00:14.0-usb-0:1:1.0", 57600),
         ("/dev/serial/by-path/pci-0:00:14.0-usb-0:1", "/dev/serial/by-path/pci-0:00:14.0-usb-0:1", 57600),
@@ -72,6 +95,7 @@ def test_a_link_to_a_terminal_outside_dev_is_serial(tmp_path: Path) -> None:
     terminal = tmp_path / "ttyV0"
     terminal.symlink_to("/dev/null")
     assert parse(f"{terminal},9600")[:5] == (SERIAL, "", 0, str(terminal), 9600)
+    assert parse(f"{terminal}:9600:8N1")[:5] == (SERIAL, "", 0, str(terminal), 9600)
 
 
 def test_a_file_that_exists_or_a_name_in_tlog_is_a_log(tmp_path: Path) -> None:
@@ -94,7 +118,27 @@ def test_the_text_of_a_connection_describes_the_link() -> None:
     [
         ("udp:127.0.0.1", "has no port; write for example udp:127.0.0.1:14550"),
         ("udp:10.1.1.1:", "has no port; write for example udp:10.1.1.1:14550"),
-        ("udp:14550", "is not HOST:PORT; write for example udp:127.0.0.1:14550"),
+        ("udpout:14550", "is not HOST:PORT; write for example udpout:192.168.1.20:14550"),
+        (":65536", "a port is 1 to 65535, not 65536"),
+        ("14550", "is a port; write udp:14550 to listen there, or HOST:14550 to send"),
+        ("upd:14550", "unknown connection type upd:; did you mean udp: ? For a host write udpout:upd:14550"),
+        ("updin:14550", "did you mean udpin: ?"),
+        ("udpni:127.0.0.1:14550", "did you mean udpin: ?"),
+        ("udp_in:127.0.0.1:14550", "did you mean udpin: ?"),
+        ("udpin127.0.0.1:14550", "a colon is missing; write udpin:127.0.0.1:14550"),
+        ("udpclient://192.168.2.1:14550?direction=sender", "write udpout:192.168.2.1:14550"),
+        ("/dev/ttyUSB0:115200:7E1", "the frame format is 8N1, as MAVLink has it, not 7E1; write /dev/ttyUSB0:115200"),
+        ("/dev/ttyUSB0,57600,8E2", "the frame format is 8N1, as MAVLink has it, not 8E2; write /dev/ttyUSB0:57600"),
+        ("tcp-l://0.0.0.0:5760", "is MAVROS's form; write tcpin:0.0.0.0:5760"),
+        ("tcp-l://", "is MAVROS's form; write tcpin:0.0.0.0:5760"),
+        ("udp-b://@", "is MAVROS's form; write udpbcast:192.168.1.255:14550"),
+        ("serial-hwfc:///dev/ttyUSB0:57600", "flow control is not used; write serial:/dev/ttyUSB0:57600"),
+        ("mqtt://broker/robots", "is an MQTT broker, which is an output; write --mqtt mqtt://broker/robots"),
+        ("http://10.1.1.1:8080", "is a web address, not a source of MAVLink; to serve a web page write --http 127."),
+        ("https://example.com/flight.tlog", "is a web address"),
+        ("zenoh://localhost:7447", "is an output for ROS 2; write --ros2 zenoh://localhost:7447"),
+        ("ur:10.0.0.1", "is an arm, not a source of MAVLink; write --arm ur:10.0.0.1"),
+        ("file:///tmp/flight.tlog", "is a file; write its path alone: /tmp/flight.tlog"),
         ("udp:", "has no port; write for example udp:127.0.0.1:14550"),
         ("tcp:[::1]", "has no port; write for example tcp:[::1]:5760"),
         ("192.168.1.20", "has no port; write 192.168.1.20:14550 to send there, or udp:192.168.1.20:14550 to listen"),

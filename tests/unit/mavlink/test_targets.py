@@ -77,6 +77,8 @@ def test_the_targets_of_our_own_frames_are_found(version: int) -> None:
         if "target_system" not in fields:
             assert definition.id not in TARGETS
             continue
+        if version == 1 and definition.id > 255:  # MAVLink 1 has one byte for it
+            continue
         zeros = dict(zip(fields, definition.layout.unpack(bytes(definition.layout.size)), strict=True))
         target = {name: value for name, value in (("target_system", 7), ("target_component", 9)) if name in fields}
         message = definition.type(**zeros | target)

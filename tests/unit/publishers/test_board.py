@@ -44,6 +44,39 @@ def test_an_entry_is_the_native_line() -> None:
     jsonschema.validate(whole, schema)
 
 
+def test_the_members_of_a_group_follow_it_once_and_the_others_come_after() -> None:
+    board = Board()
+    for handle, detail in {
+        "a": Detail(1, 1),
+        "b": Detail(2, 1),
+        "arm": Detail(),
+        "other": Detail(),
+        "robot": Detail(2, 192, members=("b", "arm", "absent")),
+        "second": Detail(3, 192, members=("arm", "a")),
+    }.items():
+        board.update(msg(MANUAL, detail, handle), 1.0)
+    assert [entry.line["handle"] for entry in board] == ["robot", "b", "arm", "second", "a", "other"]
+
+
+def test_members_of_a_hostile_line_are_no_error() -> None:
+    board = Board()
+    for handle, members in {"a": "b", "b": [["a"], 7, None, "a", "b"], "c": {"a": 1}, "d": 7}.items():
+        board.update_line(handle, {"members": members}, 1.0)
+    assert [entry.line["handle"] for entry in board] == ["b", "a", "c", "d"]
+
+
+def test_the_same_inhibit_of_two_members_is_two_changes() -> None:
+    board = Board()
+    inhibits = (Inhibit("E_STOPPED", "the button", 7, "arm"), Inhibit("E_STOPPED", None, 7, "rover"))
+    board.update(msg(MANUAL, Detail(1, 192, inhibits=inhibits, members=("rover", "arm"))), 1.0)
+    board.update(msg(MANUAL, Detail(1, 192, inhibits=inhibits[1:], members=("rover", "arm"))), 2.0)
+    assert [value for name, value, _ in changes(board) if name == "inhibit"] == [
+        {"name": "E_STOPPED", "text": "the button", "handle": "arm", "begins": True},
+        {"name": "E_STOPPED", "text": None, "handle": "rover", "begins": True},
+        {"name": "E_STOPPED", "text": "the button", "handle": "arm", "begins": False},
+    ]
+
+
 def test_seq_counts_lines_and_the_version_counts_changes() -> None:
     board = Board()
     for at in range(3):
@@ -63,6 +96,15 @@ def test_an_entry_has_the_version_of_the_board_at_its_last_change() -> None:
     assert {handle: entry.version for handle, entry in board.entries.items()} == {"a": 4, "b": 2, "c": 3}
 
 
+def test_of_several_causes_with_one_name_the_first_is_the_transition() -> None:
+    board = Board()
+    board.update(msg(MANUAL), 0)
+    twice = (Inhibit("PREARM_FAILING", "No fix", 0), Inhibit("PREARM_FAILING", "No sticks", 0))
+    board.update(msg(MANUAL, Detail(1, 1, inhibits=twice)), 1)
+    begins = [value for name, value, _ in changes(board) if name == "inhibit"]
+    assert begins == [{"name": "PREARM_FAILING", "text": "No fix", "begins": True}]
+
+
 def test_a_change_is_a_transition_with_the_previous_value() -> None:
     board = Board()
     board.update(msg(MANUAL), 0)
@@ -77,9 +119,53 @@ def test_a_change_is_a_transition_with_the_previous_value() -> None:
         ("inhibit", {"name": "DISARMED", "text": "no", "begins": True}, None),
     ]
     board.update(msg(AUTO, detail._replace(inhibits=(), link=LinkState.LOST)), 2)
+    assert changes(board)[-1] == ("link", "LOST", "CONNECTED")  # nobody knows whether it is armed
+    board.update(msg(AUTO, detail._replace(inhibits=())), 3)
     assert changes(board)[-2:] == [
-        ("link", "LOST", "CONNECTED"),
+        ("link", "CONNECTED", "LOST"),
         ("inhibit", {"name": "DISARMED", "text": "no", "begins": False}, None),
+    ]
+
+
+def test_a_loss_ends_no_error_and_the_last_line_before_it_is_kept() -> None:
+    board, error = Board(), ErrorCause(2001, "RADIO", "Radio Failsafe", 5)
+    lost = Detail(1, 1, inhibits=(Inhibit("LINK_STALE", None, 9),), link=LinkState.LOST)
+    for at, detail in enumerate((Detail(1, 1, (error,)), lost, Detail(1, 1, (error,)), Detail(1, 1))):
+        board.update(msg(AUTO, detail)._replace(unix_us=at), at)
+    assert [value["begins"] for name, value, _ in changes(board) if name in ("error", "inhibit")] == [True, False]
+    last = board.entries["robot"].last
+    assert last is not None
+    assert (last["stamp"], last["errors"][0]["name"], last["link"]["heartbeat_age"]) == (
+        "1970-01-01T00:00:00.000000Z",
+        "RADIO",
+        0.1,
+    )
+
+
+def test_an_error_of_a_member_that_is_not_heard_does_not_end() -> None:
+    board, members = Board(), ("rover", "arm")
+    error, stale = ErrorCause(2001, "RADIO", None, 5, "rover"), Inhibit("LINK_STALE", None, 9, "rover")
+    board.update(msg(AUTO, Detail(1, 192, (error,), members=members)), 0)
+    board.update(msg(AUTO, Detail(1, 192, inhibits=(stale,), members=members)), 1)
+    assert [value for name, value, _ in changes(board) if name == "error"] == [
+        {"name": "RADIO", "text": None, "handle": "rover", "begins": True}
+    ]
+
+
+def test_a_line_can_come_with_the_last_one_before_a_loss() -> None:
+    board = Board()
+    board.update_line("robot", {"link": {"state": "LOST"}}, 1.0, {"mode": "AUTO"})
+    assert board.entries["robot"].last == {"mode": "AUTO"}
+
+
+def test_several_reasons_of_one_name_begin_and_end_together_with_the_first_text() -> None:
+    board = Board()
+    gps, compass = Inhibit("PREARM_FAILING", "GPS", 0), Inhibit("PREARM_FAILING", "Compass", 0)
+    for at, inhibits in enumerate(((), (gps, compass), (compass,), ())):
+        board.update(msg(MANUAL)._replace(detail=Detail(1, 1, inhibits=inhibits)), at)
+    assert [value for name, value, _ in changes(board) if name == "inhibit"] == [
+        {"name": "PREARM_FAILING", "text": "GPS", "begins": True},
+        {"name": "PREARM_FAILING", "text": "Compass", "begins": False},
     ]
 
 

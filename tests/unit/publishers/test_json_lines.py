@@ -141,6 +141,17 @@ def test_the_ros_2_form_lists_every_code(pipe: Pipe) -> None:
     assert codes == [[2001, 3005], [2001], []]
 
 
+@pytest.mark.parametrize("form", ["ros1", "ros2"])
+def test_the_ros_forms_of_a_group_have_its_handle_and_the_codes_of_all_members(pipe: Pipe, form: str) -> None:
+    errors = tuple(error._replace(handle=name) for error, name in zip(DETAIL.errors, ("base", "arm"), strict=True))
+    on(pipe, format=form).publish(MSG._replace(detail=DETAIL._replace(errors=errors, members=("base", "arm"))))
+    line = json.loads(pipe.read())
+    assert line["header"]["frame_id"] == MSG.handle
+    assert line.get("error_code", 2001) == 2001
+    assert line.get("error_codes", [2001, 3005]) == [2001, 3005]
+    assert not {"members", "errors"} & line.keys()
+
+
 def test_each_handle_has_its_own_seq_and_a_negative_age_is_zero(pipe: Pipe) -> None:
     publisher = on(pipe)
     for handle, age in (("a", -0.01), ("b", None), ("a", 1.0)):

@@ -54,6 +54,19 @@ def test_a_message_has_every_field_of_a_status() -> None:
     assert message == (77, 9, 0b10010, 4, 1, 2, -1, 1, 0, 1, 1)
 
 
+def test_a_group_and_its_vehicle_are_two_subjects_of_one_system(publisher: MavlinkPublisher, port: Port) -> None:
+    stopped = RobotStatus(e_stopped=TriState.TRUE, motion_possible=TriState.FALSE)
+    stop = Inhibit("E_STOPPED", None, 0, "arm")
+    group = msg(stopped, Detail(4, 192, inhibits=(stop,), members=("base", "arm")), "robot")
+    base = msg(RobotStatus(e_stopped=TriState.FALSE), Detail(4, 1), "base")
+    for at in (0.0, 1.0):
+        publish(publisher, at, *(one._replace(unix_us=int(at * 1e6)) for one in (group, base)))
+        assert [(s.system, s.message.subject_system, s.message.subject_component, s.message.e_stopped)
+                for s in port.taken()] == [(4, 4, 192, 1), (4, 4, 1, 0)]  # fmt: skip
+    publish(publisher, 2.0, msg(stopped, Detail(members=("arm", "arm2")), "arms"))
+    assert port.taken() == []  # nobody would know whose it is
+
+
 @pytest.mark.parametrize("period", [0.1, 0.3, 0.7])
 def test_any_rate_is_limited_to_1_hz_on_average(publisher: MavlinkPublisher, port: Port, period: float) -> None:
     run(publisher, 60, period)
@@ -167,8 +180,18 @@ def test_a_returning_audience_gets_the_last_status_at_once(
     publish(publisher, 0.1, msg())
     port.taken()
     port.present = [STATION]
-    publish(publisher, 0.2)
-    assert [s.key for s in port.sent] == ["station"]
+    assert publish(publisher, 0.2) == 0.2  # at once, with what the controllers then publish again
+    publish(publisher, 0.2, msg()._replace(unix_us=200_000))
+    assert [(s.key, s.message.time_usec) for s in port.sent] == [("station", 200_000)]
+
+
+def test_without_an_audience_no_periodic_messages_are_taken(publisher: MavlinkPublisher, port: Port) -> None:
+    taken = []
+    for number, present in enumerate([[STATION], [], [STATION._replace(interval=math.inf)], [STATION]]):
+        port.present = list(present)
+        publish(publisher, float(number))
+        taken.append(publisher.periodic)
+    assert taken == [True, False, False, True]
 
 
 def test_the_state_of_a_gone_audience_is_deleted(publisher: MavlinkPublisher, port: Port) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from mav_robot_status import __version__
 from mav_robot_status.interface import (
     ConnectionMetrics,
@@ -39,6 +41,19 @@ DETAIL = Detail(
     Vehicle("ARDUPILOTMEGA", "GROUND_ROVER", "AUTO", 10, "ACTIVE"),
 )
 ROVER = RobotStatusMsg("rover", 0, STATUS, DETAIL, 0.25)
+ROBOT = RobotStatusMsg(
+    "robot",
+    0,
+    RobotStatus(motion_possible=NO),
+    Detail(
+        1,
+        192,
+        inhibits=(Inhibit("E_STOPPED", "the button", 0, "arm"), Inhibit("E_STOPPED", None, 0, "rover")),
+        vehicle=Vehicle(type="GROUP"),
+        members=("rover", "arm"),
+    ),
+    0.25,
+)
 UNHEARD = RobotStatusMsg("boat", 0, RobotStatus(), Detail(link=LinkState.NEVER_SEEN), None)
 LINK = ConnectionMetrics("udp:0.0.0.0:14550", False, 1, 100, 2, {0: 3, 74: 4}, 5, 6, 7, 8, 9, 10)
 OF_ROVER = 'handle="rover",system="1",component="1"'
@@ -80,6 +95,26 @@ def test_each_active_cause_and_reason_is_a_series_and_no_other() -> None:
         f'inhibit{{{OF_ROVER},reason="DISARMED"}}',
     }
     assert not [series for series in samples(UNHEARD) if series.startswith(("error{", "inhibit{"))]
+
+
+def test_several_reasons_of_one_name_are_one_series() -> None:
+    inhibits = (*DETAIL.inhibits, Inhibit("PREARM_FAILING", "GPS", 0), Inhibit("PREARM_FAILING", "Compass", 0))
+    page = samples(ROVER._replace(detail=DETAIL._replace(inhibits=inhibits)))
+    assert [series for series in page if "PREARM_FAILING" in series] == [
+        f'inhibit{{{OF_ROVER},reason="PREARM_FAILING"}}'
+    ]
+
+
+def test_a_reason_that_is_there_twice_is_one_series() -> None:
+    twice = (Inhibit("PREARM_FAILING", "No fix", 0), Inhibit("PREARM_FAILING", "No sticks", 0))
+    found = samples(ROVER._replace(detail=DETAIL._replace(inhibits=twice)))
+    assert found[f'inhibit{{{OF_ROVER},reason="PREARM_FAILING"}}'] == "1"
+
+
+@pytest.mark.parametrize(("can_arm", "value"), [(True, "1"), (False, "0"), (None, None)])
+def test_can_arm_is_a_number_while_it_is_known(can_arm: bool | None, value: str | None) -> None:
+    found = samples(ROVER._replace(detail=DETAIL._replace(vehicle=DETAIL.vehicle._replace(can_arm=can_arm))))
+    assert found.get(f"can_arm{{{OF_ROVER}}}") == value
 
 
 def test_a_text_of_an_autopilot_is_never_a_label() -> None:
@@ -124,6 +159,19 @@ def test_a_publisher_has_the_length_of_its_queue_and_its_drops() -> None:
     assert found['publisher_dropped_messages_total{publisher="json",number="2"}'] == "0"
 
 
+def test_a_group_is_another_series_than_its_vehicle_and_names_its_members() -> None:
+    found = samples(ROVER, ROBOT)
+    of_robot = 'handle="robot",system="1",component="192"'
+    assert found[f"motion_possible{{{of_robot}}}"] == "0"
+    assert found[f'inhibit{{{of_robot},reason="E_STOPPED",member="arm"}}'] == "1"
+    assert found[f'inhibit{{{of_robot},reason="E_STOPPED",member="rover"}}'] == "1"
+    assert [series for series in found if series.startswith("group_member")] == [
+        f'group_member{{{of_robot},member="rover"}}',
+        f'group_member{{{of_robot},member="arm"}}',
+    ]
+    assert not [series for series in found if series.startswith(f"vehicle_info{{{of_robot}")]
+
+
 def test_a_gateway_without_a_recording_has_no_series_for_it() -> None:
     assert samples(record_dropped=0)["record_dropped_frames_total"] == "0"
     assert not [series for series in samples() if series.startswith("record")]
@@ -144,7 +192,8 @@ def test_large_counters_keep_every_digit() -> None:
 
 
 def test_every_family_has_one_header_and_consecutive_lines() -> None:
-    text = exposition(Metrics((ROVER, UNHEARD), (LINK,), (PublisherMetrics("json", 1, 0, 0),), 0))
+    ready = ROVER._replace(detail=DETAIL._replace(vehicle=DETAIL.vehicle._replace(can_arm=True)))
+    text = exposition(Metrics((ready, UNHEARD, ROBOT), (LINK,), (PublisherMetrics("json", 1, 0, 0),), 0))
     heads = re.findall(r"^# HELP (\S+) .+\n# TYPE \1 (gauge|counter)\n\1[{ ]", text, re.MULTILINE)
     assert [name.removeprefix(PREFIX) for name, _ in heads] == [
         family.name for family in (*GATEWAY, *VEHICLE, *CONNECTION, *PUBLISHER)

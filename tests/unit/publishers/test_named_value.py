@@ -41,6 +41,15 @@ def values(sent: list[Sent]) -> list[tuple[str, int]]:
     return [(text(s.message.name), s.message.value) for s in sent if isinstance(s.message, NamedValueInt)]
 
 
+def test_a_group_is_not_taken_for_the_vehicle_whose_system_id_it_has(port: Port, mirror: NamedValuePublisher) -> None:
+    stopped = RobotStatus(e_stopped=TriState.TRUE)
+    group = msg(stopped, Detail(1, 192, members=("rover", "arm")), "robot")
+    publish(mirror, 0.0, group, msg(DRIVING, handle="rover"))
+    assert values(port.taken()) == [("RS_STATE", packed(DRIVING)), ("RS_ERROR", 0)]
+    publish(mirror, 10.0, group)
+    assert port.taken() == []
+
+
 def texts(sent: list[Sent]) -> list[tuple[int, str]]:
     return [(s.message.severity, text(s.message.text)) for s in sent if isinstance(s.message, Statustext)]
 

@@ -17,11 +17,14 @@ from mav_robot_status.publishers.json_lines import JsonLinesPublisher
 from mav_robot_status.publishers.mavlink import MavlinkPublisher
 from mav_robot_status.publishers.mqtt.publisher import MqttPublisher
 from mav_robot_status.publishers.named_value import NamedValuePublisher
+from mav_robot_status.publishers.ros.publisher import Ros2Publisher
+from mav_robot_status.publishers.simple_message.publisher import SimpleMessagePublisher
 from mav_robot_status.publishers.web.publisher import HttpPublisher
 from mav_robot_status.testing.conformance import publisher as module
 from mav_robot_status.testing.conformance.controller import ControllerConformance
 from mav_robot_status.testing.conformance.publisher import PublisherConformance
 
+from ...loopback import LOOPBACK
 from ..gateway.third_party import Collecting
 
 
@@ -73,6 +76,32 @@ class TestMqtt(PublisherConformance):
     @pytest.fixture(autouse=True)
     def _spool(self, tmp_path: Path) -> None:
         self.options = {"url": "mqtt://127.0.0.1:1/robots", "spool": str(tmp_path / "spool"), "robot": "r-{handle}"}
+
+
+class TestSimpleMessage(PublisherConformance):
+    def make_publisher(self, context: PublisherContext) -> Publisher:
+        return SimpleMessagePublisher(context)
+
+    options: Mapping[str, object] = {"port": 0}
+
+
+class TestRos2OverZenoh(PublisherConformance):
+    def make_publisher(self, context: PublisherContext) -> Publisher:
+        return Ros2Publisher(context)
+
+    options: Mapping[str, object] = {"url": "zenoh://127.0.0.1:1"}
+
+
+class TestRos2OverDds(PublisherConformance):
+    def make_publisher(self, context: PublisherContext) -> Publisher:
+        return Ros2Publisher(context)
+
+    options: Mapping[str, object] = {"url": "dds://71"}
+
+    @pytest.fixture(autouse=True)
+    def _loopback(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        pytest.importorskip("cyclonedds", reason="cyclonedds is not installed: it has no wheel for this Python")
+        monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
 
 
 class TestThirdPartyPublisher(PublisherConformance):

@@ -10,7 +10,7 @@ import pytest
 
 from mav_robot_status.testing import BY_NAME, DEMO, FakeAutopilot, Scenario, Step, arducopter, ardurover, decode, px4
 
-SET_MESSAGE_INTERVAL, ARM_DISARM, DO_SET_MODE = 511, 400, 176
+SET_MESSAGE_INTERVAL, ARM_DISARM, DO_SET_MODE, RUN_PREARM_CHECKS = 511, 400, 176, 401
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 
 
@@ -104,6 +104,24 @@ def test_arming_is_refused_while_the_checks_fail(stage: Any) -> None:
     assert not at.autopilot.state.armed
     assert at.command(ARM_DISARM, 1, 21196).result == ACCEPTED  # forced
     assert at.autopilot.state.armed
+
+
+def test_ardupilot_runs_its_checks_on_command_and_names_every_reason(stage: Any) -> None:
+    at = stage(ardurover.REASONS)
+    at.play(1.0)
+    at.listener.command(at.autopilot, RUN_PREARM_CHECKS)
+    received = at.play(0.1)
+    assert [m.result for m in received if m.get_type() == "COMMAND_ACK"] == [ACCEPTED]
+    names = ("3D Accel calibration needed", "GPS 1: Bad fix", "Compass not calibrated")
+    assert texts(received) == [f"PreArm: {name}" for name in names]
+    at.listener.command(at.autopilot, ARM_DISARM, 1)
+    assert texts(at.play(0.1)) == [f"Arm: {name}" for name in names]
+    at.command(ARM_DISARM, 1, 21196)  # forced
+    assert at.command(RUN_PREARM_CHECKS).result == TEMPORARILY_REJECTED
+
+
+def test_px4_does_not_run_its_checks_in_texts(stage: Any) -> None:
+    assert stage(px4.PREARM_FAILING).command(RUN_PREARM_CHECKS).result == UNSUPPORTED
 
 
 def test_px4_refuses_with_its_result_and_its_text(stage: Any) -> None:
@@ -260,7 +278,16 @@ def test_every_scenario_runs_to_its_end(stage: Any, scenario: Scenario) -> None:
     at = stage(scenario, speed=4.0)
     received = at.play(scenario.duration / 4 + 4.0)  # a reboot adds its boot
     assert at.autopilot.finished
-    assert "HEARTBEAT" in kinds(received)
+    assert ("HIGH_LATENCY2" if scenario.satellite else "HEARTBEAT") in kinds(received)
+
+
+@pytest.mark.parametrize(("scenario", "period"), [(ardurover.SATELLITE, 5.0), (px4.SATELLITE, 1 / 0.015)])
+def test_behind_a_satellite_it_sends_nothing_but_high_latency2(stage: Any, scenario: Scenario, period: float) -> None:
+    at = stage(scenario)
+    received = at.play(3 * period + 1.0)
+    assert kinds(received) == {"HIGH_LATENCY2"}
+    assert len(received) == 4
+    assert [m.custom0 for m in received] == ([-128] * 4 if scenario is px4.SATELLITE else [65, -63, -119, 9])
 
 
 def test_the_demo_sends_the_messages_that_a_gateway_needs(stage: Any) -> None:

@@ -19,14 +19,14 @@ from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.testing.conformance.hardware import START, Driver, HardwareConformance
 from tests.examples.line_robot import LineRobotHW
 
+from ...ports import free_port
+
 
 class Sender:
     """A robot that sends datagrams to a local port."""
 
     def __init__(self) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-            free.bind(("127.0.0.1", 0))
-            self.port: int = free.getsockname()[1]
+        self.port = free_port()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
     def make(self, *, replay: bool = False) -> HardwareInterface:

@@ -1,10 +1,12 @@
-"""Vehicles for a table: a board with their statuses, and the state of a screen that shows it."""
+"""Robots for a view: a board with their statuses, and a source that shows it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from mav_robot_status.clock import Instant
+from mav_robot_status.gateway.background import Row
 from mav_robot_status.interface import (
     Detail,
     ErrorCause,
@@ -16,9 +18,9 @@ from mav_robot_status.interface import (
     TriState,
     Vehicle,
 )
-from mav_robot_status.publishers.board import Board
-from mav_robot_status.views.terminal import state
-from mav_robot_status.views.terminal.text import Line, plain
+from mav_robot_status.publishers.board import Board, Transition
+from mav_robot_status.views.terminal.robots import Memory, Robot
+from mav_robot_status.views.terminal.text import Line
 
 START = Instant(1000.0, 1_800_000_000_000_000)  # 2027-01-15T08:00:00Z
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
@@ -73,19 +75,52 @@ def lose(board: Board, system: int, at: Instant = START, age: float = 5.0) -> No
     put(board, NOTHING, at, system=system, age=age, link=LinkState.LOST, inhibits=(stale,), vehicle=quiet)
 
 
-def screen(board: Board, **more: Any) -> state.State:
-    """The state of a screen that shows a board."""
-    vehicles = tuple(state.Vehicle(entry.line, entry.heartbeat_age) for entry in board)
-    return state.State("udp:127.0.0.1:14550", START, vehicles, **more)
+class Source:
+    """A source for a view: a board at one moment. `wait` runs the next step of the test; it ends after the last one."""
+
+    connection = "udp:127.0.0.1:14550"
+    advice = "To find out why: doctor"
+
+    def __init__(self, board: Board, *steps: Callable[[], object], rates: Mapping[str, float] | None = None) -> None:
+        self.board, self.rates, self.explained = board, rates or {}, ""
+        self.fields: dict[str, Any] = {}
+        self._steps, self._endless = list(steps), not steps
+
+    def now(self) -> Instant:
+        return START
+
+    def wait(self, seconds: float) -> bool:
+        if self._steps:
+            self._steps.pop(0)()
+        return not self._steps and not self._endless
+
+    def explanation(self) -> Mapping[str, Any] | None:
+        return {"handle": self.explained, "fields": self.fields} if self.fields else None
+
+    @property
+    def version(self) -> int:
+        return self.board.version
+
+    def rows(self) -> list[Row]:
+        return [Row(e.line, e.stamp, e.version, e.heartbeat_age, self.rates) for e in self.board]
+
+    def changes(self, handles: Iterable[str], most: int) -> list[tuple[str, Transition]]:
+        found = [(handle, change) for handle in handles for change in self.board.entries[handle].transitions]
+        return found[: -most - 1 : -1]
 
 
-def one(**more: Any) -> state.State:
-    """A screen with one vehicle."""
+def robots(board: Board) -> list[Robot]:
+    """The robots of a board."""
+    return Memory().robots(Source(board).rows(), START)
+
+
+def one(**more: Any) -> Robot:
+    """A robot."""
     board = Board()
     put(board, **more)
-    return screen(board)
+    return robots(board)[0]
 
 
-def texts(lines: list[Line]) -> list[str]:
+def texts(lines: Iterable[Line]) -> list[str]:
     """The visible text of each line."""
-    return [plain(line).rstrip() for line in lines]
+    return ["".join(span.text for span in line).rstrip() for line in lines]

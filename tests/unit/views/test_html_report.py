@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 from mav_robot_status.errors import LinkError, UsageError
-from mav_robot_status.interface import TRI_STATES, Evidence
+from mav_robot_status.interface import TRI_STATES, Evidence, Inhibit
+from mav_robot_status.language import LOOKS
 from mav_robot_status.views.html_report import as_html, as_json, embedded, save
 
-from .flights import FALSE, TRUE, UNKNOWN, Flight, error
+from .flights import FALSE, START_US, TRUE, UNKNOWN, Flight, S, error
 
 HOSTILE = "</script><script>alert(1)</script><!-- & \u2028 {{data}} \ud800"
 
@@ -51,6 +52,20 @@ def test_an_interval_has_its_times_and_its_evidence() -> None:
             "source": "EXTENDED_SYS_STATE",
         }
     ]
+
+
+def test_a_group_names_its_members_and_who_reports_a_reason() -> None:
+    flight = Flight()
+    flight.detail = flight.detail._replace(component=192, members=("base", "arm"))
+    flight.say(0, inhibits=(Inhibit("E_STOPPED", "the button", 0, "arm"), Inhibit("E_STOPPED", None, 0, "base")))
+    found = told(flight, 2)
+    assert found["members"] == ["base", "arm"]
+    for reasons in (found["intervals"]["inhibits"], found["totals"]["inhibits"]):
+        assert sorted((one["handle"], one["name"]) for one in reasons) == [("arm", "E_STOPPED"), ("base", "E_STOPPED")]
+    (vehicle,) = data_of(as_html([flight.end(2)], ""))["logs"][0]["vehicles"]
+    assert (vehicle["name"], vehicle["handle"]) == ("handle", "base, arm")
+    assert sorted(vehicle["inhibits"]) == ["arm: E_STOPPED", "base: E_STOPPED"]
+    assert sorted(total["name"] for total in vehicle["totals"]["inhibits"]) == sorted(vehicle["inhibits"])
 
 
 def test_without_a_flight_mode_its_value_is_null() -> None:
@@ -133,6 +148,43 @@ def test_intervals_are_packed_as_gap_length_value_and_why() -> None:
     assert strings[packed[3]] == ["airborne", None]
     assert packed[4:6] == [0, 1_000_000]
     assert strings[packed[6]] == "FALSE"
+
+
+def test_the_page_has_the_looks_of_the_one_table() -> None:
+    looks = data_of(as_html([Flight().say(0).end(1)], ""))["looks"]
+    assert set(looks) == {*LOOKS, "armed"}
+    assert looks["mode"]["MANUAL"] == {"word": "MANUAL", "glyph": "☺", "tone": "calm", "bar": "half"}
+    for field, rows in LOOKS.items():
+        assert [row["word"] for row in looks[field].values()] == [look.word for look in rows.values()]
+
+
+def test_a_reason_of_the_page_has_its_kind_its_tone_and_its_step() -> None:
+    failing = Inhibit("PREARM_FAILING", "PreArm: GPS 1: Bad fix", START_US)
+    flight = Flight().say(0, armed=False, inhibits=(failing,), errors=(error(2003, "BATTERY_LOW"),)).lose(2)
+    (vehicle,) = data_of(as_html([flight.end(4)], ""))["logs"][0]["vehicles"]
+    rows = [*vehicle["totals"]["errors"], *vehicle["totals"]["inhibits"]]
+    assert {row["name"]: (row["kind"], row["tone"]) for row in rows} == {
+        "BATTERY_LOW": ("error", "alarm"),
+        "DISARMED": ("inhibit", "calm"),
+        "PREARM_FAILING": ("inhibit", "warning"),
+        "LINK_STALE": ("unknown", "unknown"),
+    }
+    (gps,) = (row for row in rows if row["name"] == "PREARM_FAILING")
+    assert (gps["sentence"], gps["steps"]) == ("it cannot be armed", ["Wait for a fix or check the antenna."])
+
+
+def test_texts_at_the_same_time_are_one_row_of_the_page() -> None:
+    gps, compass = (Inhibit("PREARM_FAILING", text, START_US) for text in ("GPS", "Compass"))
+    flight = Flight().say(0, inhibits=(gps,)).say(1, inhibits=(gps, compass)).say(3, inhibits=(compass,)).say(4)
+    log = data_of(as_html([flight.say(6, inhibits=(gps,)).end(7)], ""))["logs"][0]
+    packed = log["vehicles"][0]["inhibits"]["PREARM_FAILING"]
+    spans = [packed[i : i + 4] for i in range(0, len(packed), 4)]
+    assert [(gap, length, log["strings"][text]) for gap, length, text, _ in spans] == [
+        (0, 1 * S, "GPS"),
+        (0, 2 * S, "GPS; Compass"),
+        (0, 1 * S, "Compass"),
+        (2 * S, 1 * S, "GPS"),
+    ]
 
 
 def test_a_page_of_many_short_intervals_is_smaller_than_their_messages() -> None:

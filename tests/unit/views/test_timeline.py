@@ -52,6 +52,19 @@ def test_a_vehicle_is_armed_without_the_inhibit_disarmed_and_unknown_on_a_lost_l
     ]
 
 
+def test_the_same_inhibit_of_two_members_is_two_intervals_and_a_group_is_not_armed() -> None:
+    flight = Flight()
+    flight.detail = flight.detail._replace(members=("base", "arm"))
+    of_arm, of_base = (Inhibit("E_STOPPED", None, START_US, handle) for handle in ("arm", "base"))
+    vehicle = flight.say(0, inhibits=(of_arm, of_base)).say(2, inhibits=(of_base,)).vehicle(3)
+    assert [(reason.title, reason.end / S) for reason in vehicle.inhibits] == [
+        ("arm: E_STOPPED", 2),
+        ("base: E_STOPPED", 3),
+    ]
+    assert vehicle.members == ("base", "arm")
+    assert values(vehicle.tracks["armed"]) == [(0, 3, "UNKNOWN")]
+
+
 def test_a_lost_vehicle_keeps_its_name_and_has_no_flight_mode() -> None:
     vehicle = Flight().say(0).lose(2).vehicle(3)
     assert (vehicle.system, vehicle.component, vehicle.autopilot, vehicle.type) == (1, 1, "PX4", "QUADROTOR")
@@ -76,6 +89,15 @@ def test_a_new_text_of_a_reason_begins_another_interval() -> None:
     assert found == [
         Reason(0, 2 * S, "PREARM_FAILING", None, "GPS"),
         Reason(2 * S, 3 * S, "PREARM_FAILING", None, "Compass"),
+    ]
+
+
+def test_several_texts_of_one_reason_begin_and_end_independently() -> None:
+    gps, compass = (Inhibit("PREARM_FAILING", text, START_US) for text in ("GPS", "Compass"))
+    flight = Flight().say(0, inhibits=(gps,)).say(1, inhibits=(gps, compass)).say(3, inhibits=(compass,)).say(4)
+    assert flight.vehicle(5).inhibits == [
+        Reason(0, 3 * S, "PREARM_FAILING", None, "GPS"),
+        Reason(1 * S, 4 * S, "PREARM_FAILING", None, "Compass"),
     ]
 
 

@@ -272,6 +272,7 @@ ARDUPILOT: Final = Autopilot(
     texts=Texts(
         rules=TEXTS,
         stop_text=StopText.READINESS,
+        checks=re.compile(r"(?:PreArm|Arm): (.+)"),
         safety_switch=frozenset(),
         sends_events=False,
         failsafe_is_any={Family.ROVER: re.compile(r"(Radio|GCS) Failsafe")},
@@ -313,6 +314,7 @@ ARDUPILOT: Final = Autopilot(
         denied_by=re.compile(
             r"(PreArm|Arm): (EKF attitude is bad|AHRS:? not healthy|EKF (position|velocity|height) variance)"
         ),
+        hud_shows_thrust=True,  # motors->get_throttle(); of a QuadPlane in its VTOL modes too
         reports_estimator=True,
     ),
     requests=Requests(
@@ -320,6 +322,7 @@ ARDUPILOT: Final = Autopilot(
         watched_families=frozenset({Family.COPTER, Family.ROVER, Family.PLANE, Family.SUB}),
         once=(wanted.VERSION,),
         boot_texts=BOOT_TEXTS,
+        prearm_checks=True,
         streams=STREAMS,
     ),
 )

@@ -35,6 +35,7 @@ GENERIC: Final = Autopilot(
     texts=Texts(
         rules=(),
         stop_text=StopText.STATE,
+        checks=None,
         safety_switch=frozenset(),
         sends_events=False,
         failsafe_is_any={},
@@ -63,6 +64,7 @@ GENERIC: Final = Autopilot(
         hud=HudSpeed.REST_WITH_GPS,  # INAV, Betaflight and others send zero for a speed that they do not know
         needs_healthy_estimator=False,
         denied_by=None,
+        hud_shows_thrust=False,
         reports_estimator=False,
     ),
     requests=Requests(
@@ -70,6 +72,7 @@ GENERIC: Final = Autopilot(
         watched_families=frozenset(),
         once=(wanted.VERSION, wanted.MODES),
         boot_texts=frozenset(),
+        prearm_checks=False,
         streams={},
     ),
 )

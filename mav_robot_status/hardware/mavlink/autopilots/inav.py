@@ -6,7 +6,6 @@ present. INAV that announces itself as GENERIC uses the profile `generic`. Sourc
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from ....interface.status import RobotMode
@@ -33,8 +32,7 @@ def flight_mode(heartbeat: Heartbeat, family: Family, hints: ModeHints) -> Fligh
     return look_up(ardupilot.MODES[numbers_of], number, f"INAV in ArduPilot's {numbers_of.value} numbers", hints)
 
 
-INAV: Final[Autopilot] = replace(
-    GENERIC,
+INAV: Final[Autopilot] = GENERIC._replace(
     name="INAV",
     recognition=Recognition(
         autopilots=ardupilot.ARDUPILOT.recognition.autopilots, lacks=mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
@@ -45,6 +43,7 @@ INAV: Final[Autopilot] = replace(
         hud=HudSpeed.MOTION_AND_REST,
         needs_healthy_estimator=False,
         denied_by=None,
+        hud_shows_thrust=False,
         reports_estimator=False,
     ),
 )

@@ -14,7 +14,6 @@ whose SYS_STATUS lacks the same sensor.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from ....interface.status import RobotMode
@@ -61,18 +60,25 @@ def flight_mode(heartbeat: Heartbeat, family: Family, hints: ModeHints) -> Fligh
     return FlightMode(mode, name, rule)
 
 
-PAPARAZZI: Final[Autopilot] = replace(
-    GENERIC,
+PAPARAZZI: Final[Autopilot] = GENERIC._replace(
     name="Paparazzi",
     recognition=Recognition(autopilots=frozenset({mavlink.MAV_AUTOPILOT_PPZ}), lacks=None),
     modes=Modes(flight_mode=flight_mode, overrides_key=None, initialising={}),
-    sensors=replace(GENERIC.sensors, weights={}, are_monitored=False),
+    sensors=GENERIC.sensors._replace(weights={}, are_monitored=False),
     speeds=Speeds(
         zero=ZeroSpeed.GPS_HEALTHY,
         hud=HudSpeed.MOTION_ONLY,
         needs_healthy_estimator=False,
         denied_by=None,
+        hud_shows_thrust=False,
         reports_estimator=False,
     ),
-    requests=Requests(wanted=(), watched_families=frozenset(), once=(), boot_texts=frozenset(), streams={}),
+    requests=Requests(
+        wanted=(),
+        watched_families=frozenset(),
+        once=(),
+        boot_texts=frozenset(),
+        prearm_checks=False,
+        streams={},
+    ),
 )

@@ -4,9 +4,10 @@ fails at import.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING
+
+from ....values import NamedTuple
 
 if TYPE_CHECKING:
     import re
@@ -62,8 +63,7 @@ class HudSpeed(Enum):
     REST_WITH_GPS = "its speed; zero counts only with a healthy GPS receiver in SYS_STATUS, unless it is an aircraft"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Recognition:
+class Recognition(NamedTuple):
     """How the software of a vehicle is identified."""
 
     autopilots: frozenset[int]
@@ -73,8 +73,7 @@ class Recognition:
     which none of them is present. None: the announced autopilot is correct."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Modes:
+class Modes(NamedTuple):
     """The flight mode."""
 
     flight_mode: Callable[[Heartbeat, Family, ModeHints], FlightMode]
@@ -84,8 +83,7 @@ class Modes:
     """The custom_mode of a vehicle that is still starting."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class States:
+class States(NamedTuple):
     """The meaning of MAV_STATE beyond its definition."""
 
     uninit: Uninit
@@ -93,12 +91,14 @@ class States:
     """Whether STANDBY, while armed, means that the land detector reports landed."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Texts:
+class Texts(NamedTuple):
     """The meaning of its texts."""
 
     rules: tuple[TextRule, ...]
     stop_text: StopText
+    checks: re.Pattern[str] | None
+    """The texts of a burst that names every failing pre-arm check; group 1 is the reason without a prefix. None: its
+    texts say why it cannot be armed one by one, and the latest counts."""
     safety_switch: frozenset[str]
     """The texts that give the safety switch as the reason not to arm."""
     sends_events: bool
@@ -110,8 +110,7 @@ class Texts:
     """The names of the firmware in the text of its boot, which gives its version, each with its kind of vehicle."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sensors:
+class Sensors(NamedTuple):
     """The meaning of SYS_STATUS."""
 
     weights: Weights
@@ -132,8 +131,7 @@ class Sensors:
     """Whether RC_RECEIVER turns unhealthy exactly when its failsafe begins."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StopCheck:
+class StopCheck(NamedTuple):
     """The pre-arm check that fails while a stop is engaged. Firmware before these versions lacks what they name."""
 
     first: Mapping[Family, Version]
@@ -144,8 +142,7 @@ class StopCheck:
     """A mission_state in MISSION_CURRENT."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stops:
+class Stops(NamedTuple):
     """Emergency stops and terminations."""
 
     shown_by: EmergencyStop
@@ -161,8 +158,7 @@ class Stops:
     """The families that an accepted MAV_CMD_DO_FLIGHTTERMINATION stops permanently, without a state that shows it."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Speeds:
+class Speeds(NamedTuple):
     """Which speeds are estimates."""
 
     zero: ZeroSpeed
@@ -171,12 +167,13 @@ class Speeds:
     """Whether a disarmed vehicle with a faulty AHRS has no estimate."""
     denied_by: re.Pattern[str] | None
     """The texts in which a disarmed autopilot says that its own estimate is wrong, repeated while it is."""
+    hud_shows_thrust: bool
+    """Whether VFR_HUD.throttle is the thrust of a multicopter's motors in every mode."""
     reports_estimator: bool
     """Whether EKF_STATUS_REPORT shows if the position is measured."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Requests:
+class Requests(NamedTuple):
     """The requests to it."""
 
     wanted: tuple[Wanted, ...]
@@ -187,12 +184,13 @@ class Requests:
     """The messages that are requested once: after the first heartbeat, and after a reboot."""
     boot_texts: frozenset[str]
     """The texts that it sends only while it starts."""
+    prearm_checks: bool
+    """Whether MAV_CMD_RUN_PREARM_CHECKS makes it report again why it cannot be armed."""
     streams: Mapping[int, int]
     """MAV_DATA_STREAM by message id, for firmware that does not know MAV_CMD_SET_MESSAGE_INTERVAL."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Autopilot:
+class Autopilot(NamedTuple):
     """The software on an autopilot, and the meaning of its messages."""
 
     name: str

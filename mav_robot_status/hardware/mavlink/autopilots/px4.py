@@ -70,6 +70,14 @@ SUB: Final[dict[tuple[int, int], tuple[str, RobotMode]]] = {
 }
 
 
+def mode_name(number: int) -> str | None:
+    """The name of a custom_mode; None if it is not in the tables."""
+    main, sub = number >> 16 & 0xFF, number >> 24 & 0xFF
+    if (main, sub) in SUB:
+        return SUB[main, sub][0]
+    return MAIN[main][0] if sub == 0 and main in MAIN else None
+
+
 def flight_mode(heartbeat: Heartbeat, family: Family, hints: ModeHints) -> FlightMode:
     """The mode by custom_mode alone: the flags of base_mode mislead (OFFBOARD sets neither MANUAL nor AUTO)."""
     number = heartbeat.custom_mode
@@ -145,6 +153,7 @@ PX4: Final = Autopilot(
     texts=Texts(
         rules=TEXTS,
         stop_text=StopText.STATE,
+        checks=None,
         safety_switch=frozenset({"Preflight Fail: Press safety button first"}),
         sends_events=True,
         failsafe_is_any={},
@@ -173,12 +182,14 @@ PX4: Final = Autopilot(
         hud=HudSpeed.MOTION_ONLY,  # no position messages are sent while the estimate is not valid
         needs_healthy_estimator=False,
         denied_by=None,
+        hud_shows_thrust=False,
         reports_estimator=False,
     ),
     requests=Requests(
         wanted=wanted.COMMON + wanted.CURRENT_MODE,
         watched_families=frozenset(),
-        once=(wanted.VERSION, wanted.MODES),
+        once=(wanted.VERSION, wanted.MODES, wanted.METADATA),
+        prearm_checks=True,
         boot_texts=frozenset(),
         streams={},
     ),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 from ....mavlink import definitions as mav
 from ....mavlink import enumerations as mavlink
+from ....values import NamedTuple
 
 
 class Wanted(NamedTuple):
@@ -34,12 +35,16 @@ class Once(NamedTuple):
     name: str
     older: int | None = None
     """The command, with 1 as its first parameter, for firmware that does not know MAV_CMD_REQUEST_MESSAGE."""
+    again: bool = False
+    """Whether it is requested again if the autopilot accepts the command and the message does not arrive."""
 
 
 VERSION: Final = Once(
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, "AUTOPILOT_VERSION", mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES
 )
 MODES: Final = Once(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, "AVAILABLE_MODES")
+METADATA: Final = Once(mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA, "COMPONENT_METADATA", again=True)
+"""Where the table of PX4's events is. Requested only if a table is wanted."""
 
 COMMON: Final = (
     wanted(mavlink.MAVLINK_MSG_ID_SYS_STATUS, 1.0),

@@ -8,22 +8,27 @@ from typing import TYPE_CHECKING, Any, Final
 from ....clock import Instant
 from ....mavlink import definitions as mav
 from ..state.vehicle_state import VehicleState
-from . import commands, heartbeat, kinematics, modes, outputs, statustext, sys_status
+from . import commands, events, heartbeat, kinematics, modes, outputs, parts, statustext, sys_status
 from .commands import overheard
+from .parts import transmitter_heard
 from .statustext import pass_time
 
 if TYPE_CHECKING:
     from ..options import HardwareOptions
 
-__all__ = ["HANDLERS", "hear", "overheard", "pass_time"]
+__all__ = ["HANDLERS", "hear", "overheard", "pass_time", "transmitter_heard"]
 
-Handler = Callable[[VehicleState, Any, Instant, "HardwareOptions"], None]
+Handler = Callable[[VehicleState, Any, Instant, "HardwareOptions"], "bool | None"]
+"""It returns True if it has changed nothing that a fact is made of, but for later times and new values of the same
+meaning. Then no fact has changed, unless `LatestMessages.unsettled` is set. Anything else: a fact may have changed."""
 
 HANDLERS: Final[dict[type, Handler]] = {
     mav.Heartbeat: heartbeat.heartbeat,
     mav.SysStatus: sys_status.sys_status,
     mav.Statustext: statustext.statustext_,
-    mav.Event: statustext.event,
+    mav.Event: events.event,
+    mav.CurrentEventSequence: events.current_event_sequence,
+    mav.ResponseEventError: events.response_event_error,
     mav.ExtendedSysState: kinematics.extended_sys_state,
     mav.GlobalPositionInt: kinematics.global_position,
     mav.LocalPositionNed: kinematics.local_position,
@@ -41,6 +46,9 @@ HANDLERS: Final[dict[type, Handler]] = {
     mav.EscTelemetry5To8: outputs.esc_telemetry,
     mav.EscTelemetry9To12: outputs.esc_telemetry,
     mav.EscStatus: outputs.esc_status,
+    mav.BatteryStatus: parts.battery_status,
+    mav.EscInfo: parts.esc_info,
+    mav.OpenDroneIdArmStatus: parts.arm_status,
     mav.CommandAck: commands.command_ack,
     mav.CurrentMode: modes.current_mode,
     mav.AvailableModes: modes.available_modes,

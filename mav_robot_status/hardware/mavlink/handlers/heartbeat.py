@@ -14,12 +14,13 @@ from ....mavlink.enumerations import (
 )
 from .. import causes
 from ..autopilots.profile import EmergencyStop, Uninit
+from ..state import arming_report, estop, event_sequence, latches, outputs, readiness, sensors
 from ..state import boot_clock as boot_rules
-from ..state import estop, latches, outputs, sensors
 from ..state.heartbeat_history import armed_before, next_heartbeat
+from ..state.high_latency import is_statement
 from ..state.latest_messages import LatestMessages, heard
 from ..state.motion import Motion
-from ..state.vehicle_state import VehicleState, begin
+from ..state.vehicle_state import VehicleState, begin, timeout_of
 from .outputs import look_again
 from .statustext import pass_time
 
@@ -42,10 +43,15 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
     if (message.autopilot, message.type) != (state.autopilot, state.vehicle_type):
         _another(state, message, now)
         return
+    if state.high_latency is not None:
+        state.high_latency = None
+        if _sent_none(state):
+            _another(state, message, now)
+            return
     pass_time(state, now, options)
     before = state.heartbeats
     last = before.runs[-1].last
-    connected = now.mono - last <= options.heartbeat_timeout
+    connected = now.mono - last <= timeout_of(state, options)
     heartbeats = state.heartbeats = next_heartbeat(before, message, now, connected)
     enabled = not heartbeats.armed and _outputs_enabled(state)
     outputs.heartbeat_arrived(state.watch, heartbeats, before, enabled, state.vehicle_type, now.mono)
@@ -63,10 +69,12 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
     if now.mono - last > LONG_LOSS:
         state.latches = latches.NO_LATCHES
         state.failsafe_cleared = None
-        state.not_ready = state.failsafe = None
+        state.failsafe = None
+        state.readiness = readiness.NOTHING
     if not connected:
         state.motion, state.gps_motion, state.rotation = Motion(), Motion(), Motion()
         state.stop = estop.unsure(state.stop, estop.LINK_LOST, now.mono)
+        state.arming = arming_report.NOTHING  # a newer one may be lost
     if heartbeats.armed and not (before.armed and connected):
         state.armed_after = seen.sys_status.message if seen.sys_status is not None else None
     if not connected or (before.armed and not heartbeats.armed):
@@ -88,6 +96,12 @@ def _another(state: VehicleState, message: Heartbeat, now: Instant) -> None:
     new = begin(message, now, state.claims)
     new.boots = state.boots
     state.become(new)
+
+
+def _sent_none(state: VehicleState) -> bool:
+    """Whether a vehicle sent no HEARTBEAT before, only HIGH_LATENCY2."""
+    beat = state.latest.heartbeat
+    return beat is not None and is_statement(beat.message)
 
 
 def _starts_anew(previous: Heartbeat, message: Heartbeat, state: VehicleState) -> bool:
@@ -146,6 +160,7 @@ def rebooted(state: VehicleState, boot: boot_rules.BootClock, now: Instant) -> N
     """After a reboot the state of the old run is invalid. A reboot while armed is an error."""
     seen = state.latest
     status = seen.sys_status if seen.sys_status is not None and seen.sys_status.at > boot.at else None
+    counts_anew = state.events.since > boot.at
     new = VehicleState(
         latest=LatestMessages(heartbeat=seen.heartbeat, sys_status=status),
         heartbeats=state.heartbeats,
@@ -158,6 +173,8 @@ def rebooted(state: VehicleState, boot: boot_rules.BootClock, now: Instant) -> N
         modes=state.modes,
         firmware=state.firmware if state.firmware is not None and state.firmware.at > boot.at else None,
         asked=state.asked,
+        events=state.events if counts_anew else event_sequence.NOTHING,
+        arming=state.arming if counts_anew else arming_report.NOTHING,
         boots=state.boots + 1,
         claims=state.claims,
     )
@@ -185,12 +202,12 @@ def _armed(state: VehicleState, previous_beat: float, now: Instant) -> None:
         state.stop = stop._replace(ready=0)
     else:
         state.stop = estop.unsure(stop, estop.ARMED, now.mono) if _may_arm_stopped(state) else estop.NOTHING
-    state.not_ready = None
+    state.readiness = readiness.NOTHING
     state.assumed_free = free and not new
 
 
 def _may_arm_stopped(state: VehicleState) -> bool:
-    """Whether this firmware may be armed while it is stopped, so that an arming is no evidence of a release."""
+    """Whether this firmware may be armed while it is stopped, so that an arming does not prove a release."""
     profile = state.profile
     checked = estop.includes_stop(profile, state.family, state.version, state.reports_mission)
     return profile.stops.check is not None and not checked

@@ -14,6 +14,8 @@ from ..state.boot_clock import heard_clock
 from ..state.estimator import FRESH as ESTIMATOR_FRESH
 from ..state.estimator import denied_until
 from ..state.latest_messages import FRESH, Heard, heard, is_fresh
+from ..state.lift import IDLE, LEAST_LIFT, heard_throttle
+from ..state.vehicle_state import is_multicopter
 from .heartbeat import clock_changed
 
 if TYPE_CHECKING:
@@ -36,10 +38,11 @@ def extended_sys_state(state: VehicleState, message: Any, now: Instant, options:
 
 def global_position(
     state: VehicleState, message: mav.GlobalPositionInt, now: Instant, options: HardwareOptions
-) -> None:
+) -> bool:
     """GLOBAL_POSITION_INT: the first choice for speed."""
     at = now.mono
-    if heard_clock(state.boot, message.time_boot_ms, at):
+    corrected = heard_clock(state.boot, message.time_boot_ms, at)
+    if corrected:
         clock_changed(state, now)
     seen = state.latest
     seen.global_position = heard(seen, message, at, seen.global_position)
@@ -47,29 +50,36 @@ def global_position(
     still = not (vx or vy or vz)
     nowhere = message.lat == 0 and message.lon == 0
     speed = _speed(state, vx / 100, vy / 100, vz / 100, still, nowhere, at, options)
-    _moved(state, state.motion, speed, at, options)
+    return _moved(state, state.motion, speed, at, options) and not corrected and _speed_counts_alike(state)
 
 
-def local_position(state: VehicleState, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> None:
+def local_position(state: VehicleState, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> bool:
     """LOCAL_POSITION_NED: the speed while no global position is fresh."""
     at = now.mono
-    if heard_clock(state.boot, message.time_boot_ms, at):
+    corrected = heard_clock(state.boot, message.time_boot_ms, at)
+    if corrected:
         clock_changed(state, now)
     seen = state.latest
     seen.local_position = heard(seen, message, at, seen.local_position)
-    if not is_fresh(seen.global_position, at, FRESH):
-        vx, vy, vz = message.vx, message.vy, message.vz
-        speed = _speed(state, vx, vy, vz, not (vx or vy or vz), False, at, options)
-        _moved(state, state.motion, speed, at, options)
+    if is_fresh(seen.global_position, at, FRESH):
+        return not corrected
+    vx, vy, vz = message.vx, message.vy, message.vz
+    speed = _speed(state, vx, vy, vz, not (vx or vy or vz), False, at, options)
+    return _moved(state, state.motion, speed, at, options) and not corrected and _speed_counts_alike(state)
 
 
-def vfr_hud(state: VehicleState, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> None:
+def vfr_hud(state: VehicleState, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> bool:
     """VFR_HUD: the last choice for speed; the throttle is for the output watch."""
     at = now.mono
     seen = state.latest
-    seen.vfr_hud = heard(seen, message, at, seen.vfr_hud)
+    before, throttle, lift = seen.vfr_hud, message.throttle, state.lift
+    carried = before is not None and before.message.throttle >= LEAST_LIFT
+    seen.vfr_hud = heard(seen, message, at, before)
+    if (throttle < IDLE or lift.idle_since is not None) and is_multicopter(state):
+        heard_throttle(lift, throttle, state.motion, at)
+    unchanged = carried and throttle >= LEAST_LIFT and state.watch.held_since is None
     if is_fresh(seen.global_position, at, FRESH) or is_fresh(seen.local_position, at, FRESH):
-        return
+        return unchanged
     still = message.groundspeed == 0  # not the climb, which comes from the barometer
     speed = _speed(state, message.groundspeed, 0.0, message.climb, still, False, at, options)
     hud = state.profile.speeds.hud
@@ -79,63 +89,70 @@ def vfr_hud(state: VehicleState, message: mav.VfrHud, now: Instant, options: Har
         speed = _if_fast(state, speed, options)
     elif hud is REST_WITH_GPS and still and state.vehicle_type not in AIRCRAFT and not _has_gps(seen.sys_status):
         speed = None
-    _moved(state, state.motion, speed, at, options)
+    return _moved(state, state.motion, speed, at, options) and unchanged and _speed_counts_alike(state)
 
 
-def gps_raw_int(state: VehicleState, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> None:
+def gps_raw_int(state: VehicleState, message: mav.GpsRawInt, now: Instant, options: HardwareOptions) -> bool:
     """GPS_RAW_INT: whether the receiver reports that it stands still."""
     if message.fix_type < GPS_FIX_TYPE_3D_FIX or message.vel == NO_SPEED:
         state.gps_motion = motion.Motion()
-        return
+        return False
     at = now.mono
     seen = state.latest
     seen.gps = heard(seen, message, at, seen.gps)
-    _moved(state, state.gps_motion, message.vel / 100, at, options)
+    return _moved(state, state.gps_motion, message.vel / 100, at, options)
 
 
-def attitude(state: VehicleState, message: mav.Attitude, now: Instant, options: HardwareOptions) -> None:
+def attitude(state: VehicleState, message: mav.Attitude, now: Instant, options: HardwareOptions) -> bool:
     """ATTITUDE: rotation."""
     at = now.mono
-    if heard_clock(state.boot, message.time_boot_ms, at):
+    corrected = heard_clock(state.boot, message.time_boot_ms, at)
+    if corrected:
         clock_changed(state, now)
     seen = state.latest
     seen.attitude = heard(seen, message, at, seen.attitude)
     if state.vehicle_type == MAV_TYPE_SURFACE_BOAT:  # they always roll
-        state.turning = fastest(message.yawspeed)
+        turning = fastest(message.yawspeed)
     else:
-        state.turning = fastest(message.yawspeed, message.rollspeed, message.pitchspeed)
+        turning = fastest(message.yawspeed, message.rollspeed, message.pitchspeed)
+    state.turning = turning
+    unchanged = not corrected and state.watch.held_since is None
     rotation = state.rotation
-    if state.turning >= motion.RATE_OFF or rotation.slow_since is None:  # while it is at rest, nothing changes
-        motion.moved(rotation, 0.0, state.turning, state.heartbeats.armed, options, at)
+    if turning < motion.RATE_OFF and rotation.slow_since is not None:
+        return unchanged  # while it is at rest, nothing changes
+    return motion.moved(rotation, 0.0, turning, state.heartbeats.armed, options, at) and unchanged
 
 
 def ekf_status_report(
     state: VehicleState, message: mav.EkfStatusReport, now: Instant, options: HardwareOptions
-) -> None:
+) -> bool:
     """EKF_STATUS_REPORT: whether the position is measured, or the estimator assumes that the vehicle stands still."""
-    flags = message.flags
+    flags, was_tilted = message.flags, state.tilted
     state.unaided, state.unaided_at = bool(flags & EKF_CONST_POS_MODE), now.mono
     state.tilted = bool(flags) and not flags & EKF_ATTITUDE  # no flags: another estimator is in use
+    return not (was_tilted or state.tilted)
 
 
-def system_time(state: VehicleState, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> None:
+def system_time(state: VehicleState, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> bool:
     """SYSTEM_TIME: the autopilot's clock."""
-    if heard_clock(state.boot, message.time_boot_ms, now.mono):
-        clock_changed(state, now)
+    if not heard_clock(state.boot, message.time_boot_ms, now.mono):
+        return True
+    clock_changed(state, now)
+    return False
 
 
 def _speed(
     state: VehicleState, x: float, y: float, z: float, still: bool, nowhere: bool, now: float, options: HardwareOptions
 ) -> float | None:
     """Speed in m/s, None where the numbers mean that there is no estimate: `still` exactly zero, `nowhere` at 0, 0."""
-    if not math.isfinite(x + y + z):
+    if not -math.inf < x + y + z < math.inf:
         return None
     speed = math.hypot(x, y) if state.family is ROVER else math.hypot(x, y, z)
     status = state.latest.sys_status
     speeds = state.profile.speeds
     if still and speeds.zero is not ALWAYS and not _counts_as_rest(speeds.zero, status, nowhere):
         return None
-    if now < denied_until(state):
+    if not state.heartbeats.armed and now < denied_until(state):
         return None
     return _measured(state, speed, z, nowhere, now, options) if speeds.reports_estimator else speed
 
@@ -172,20 +189,28 @@ def _has_gps(status: Heard | None) -> bool:
     )
 
 
-def fastest(*rates: float) -> float:
-    """The greatest magnitude of some rates. NaN is ignored."""
-    found = 0.0
-    for rate in rates:
-        if found < rate < math.inf:
-            found = rate
-        elif found < -rate < math.inf:
-            found = -rate
-    return found
+def fastest(yaw: float, roll: float = 0.0, pitch: float = 0.0) -> float:
+    """The greatest magnitude of some rates. Rates that are not finite are ignored."""
+    found = abs(yaw)
+    if roll > found or -roll > found:
+        found = abs(roll)
+    if pitch > found or -pitch > found:
+        found = abs(pitch)
+    if found < math.inf:
+        return found
+    return max(abs(rate) if math.isfinite(rate) else 0.0 for rate in (yaw, roll, pitch))
 
 
 def _moved(
     state: VehicleState, moving: motion.Motion, speed: float | None, now: float, options: HardwareOptions
-) -> None:
-    """One more sample of speed."""
-    rotation = state.turning if is_fresh(state.latest.attitude, now, FRESH) else 0.0
-    motion.moved(moving, speed, rotation, state.heartbeats.armed, options, now)
+) -> bool:
+    """Process one more sample of speed. True if it has changed nothing, see `motion.moved`."""
+    seen = state.latest.attitude
+    is_recent = seen is not None and (now <= seen.at + FRESH or is_fresh(seen, now, FRESH))  # seldom needs the call
+    rotation = state.turning if is_recent else 0.0
+    return motion.moved(moving, speed, rotation, state.heartbeats.armed, options, now)
+
+
+def _speed_counts_alike(state: VehicleState) -> bool:
+    """Whether no rule compares the latest speed: one does, while a vehicle moves that is disarmed."""
+    return state.heartbeats.armed or state.motion.value is not motion.TRUE

@@ -75,15 +75,16 @@ def param_value(state: VehicleState, message: mav.ParamValue, now: Instant, opti
         state.switches = {**state.switches, channel: int(value)}
 
 
-def rc_channels(state: VehicleState, message: mav.RcChannels, now: Instant, options: HardwareOptions) -> None:
+def rc_channels(state: VehicleState, message: mav.RcChannels, now: Instant, options: HardwareOptions) -> bool:
     """RC_CHANNELS: whether a switch of option 31 is in its stop position."""
     if not state.switches:
-        return
+        return True
     for channel, option in state.switches.items():
         if option == estop.MOTOR_ESTOP and channel <= len(message) and STOP_POSITION <= message[channel - 1] < NO_PULSE:
             state.stop_switch_at = now.mono
-            return
+            return False
     state.stop_switch_at = -math.inf
+    return False
 
 
 def named_value_float(

@@ -1,17 +1,17 @@
-"""STATUSTEXT and EVENT: what they report, and when a report without repetition ends."""
+"""STATUSTEXT: what it reports, and when a report without repetition ends."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from ....mavlink.definitions import Event, Statustext
+from ....mavlink.definitions import Statustext
 from ....mavlink.enumerations import MAV_STATE_CRITICAL, MAV_STATE_FLIGHT_TERMINATION
 from .. import causes
 from ..autopilots import firmware
 from ..autopilots import texts as text_rules
 from ..autopilots.profile import StopText
 from ..autopilots.texts import UNCLASSIFIED, Effect, When, classify
-from ..state import estop, latches, text_assembly
+from ..state import estop, latches, readiness, text_assembly
 from ..state.latest_messages import is_fresh
 from ..state.vehicle_state import Statement, ToldFirmware, honours_stop
 from . import failsafe
@@ -21,16 +21,15 @@ if TYPE_CHECKING:
     from ..options import HardwareOptions
     from ..state.vehicle_state import VehicleState
 
-MOST_INTERNAL: Final = 5
-"""The highest internal level of an EVENT that is used: 6 is a response to an operator's command."""
-
 
 def pass_time(state: VehicleState, now: Instant, options: HardwareOptions) -> None:
-    """End what has timed out at `now`: texts with missing chunks, and latches."""
+    """End what has timed out at `now`: texts with missing chunks, reasons not to arm, and latches."""
     if state.texts:
         state.texts, overdue = text_assembly.overdue(state.texts, now.mono)
         for text in overdue:
             _said(state, text, now)
+    if state.readiness is not readiness.NOTHING:
+        state.readiness = readiness.passed(state.readiness, now.mono)
     if state.latches:
         state.latches = latches.lasting(
             state.latches, state.heartbeats, _error_bits(state, now.mono, options), now.mono, options.text_hold_s
@@ -81,9 +80,9 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
         if state.profile.texts.stop_text is StopText.STATE:
             state.failsafe = _say(state.failsafe, words, now)
         elif engaged:
-            state.not_ready = _say(state.not_ready, words, now)
+            _not_ready(state, words, now)
     elif effect is Effect.READINESS:
-        state.not_ready = _say(state.not_ready, words, now)
+        _not_ready(state, words, now)
         denied_by = state.profile.speeds.denied_by
         if denied_by is not None and denied_by.match(words):
             state.denied_at = now.mono
@@ -102,20 +101,14 @@ def _counts(when: When, state: VehicleState) -> bool:
     return True
 
 
+def _not_ready(state: VehicleState, words: str, now: Instant) -> None:
+    """A reason why it cannot be armed: one of a burst, or the only one."""
+    checks = state.profile.texts.checks
+    if checks is None:
+        state.readiness = readiness.alone(state.readiness, words, now)
+    elif (found := checks.match(words)) is not None:
+        state.readiness = readiness.reported(state.readiness, words, found[1], now)
+
+
 def _say(before: Statement | None, words: str, now: Instant) -> Statement:
     return Statement(words, before.since if before is not None and before.text == words else now, now.mono)
-
-
-def event(state: VehicleState, message: Event, now: Instant, options: HardwareOptions) -> None:
-    """EVENT (PX4): without metadata only the levels of an event are known."""
-    if message.sequence == state.event:
-        return
-    state.event = message.sequence
-    external, internal = message.log_levels & 0x0F, message.log_levels >> 4
-    if (
-        state.profile.texts.sends_events
-        and state.heartbeats.armed
-        and external <= UNCLASSIFIED
-        and internal <= MOST_INTERNAL
-    ):
-        state.latches = latches.announce(state.latches, causes.EVENT + external, None, now, "EVENT")

@@ -9,7 +9,7 @@ from ....interface.status import TriState
 from ....mavlink.definitions import SysStatus
 from .. import causes
 from ..autopilots import shown_by
-from ..state import estop, latches, sensors
+from ..state import estop, latches, readiness, sensors
 from ..state.latest_messages import heard
 from . import failsafe
 
@@ -37,8 +37,8 @@ def sys_status(state: VehicleState, message: SysStatus, now: Instant, options: H
     checked = estop.includes_stop(profile, state.family, state.version, state.reports_mission)
     state.stop = estop.heard_sys_status(state.stop, message, state.heartbeats, profile, checked, now.mono)
     state.faults = sensors.heard_faults(state.faults, sensors.faulty_mask(message, profile), now)
-    if state.not_ready is not None and sensors.readiness(message, profile) is TriState.TRUE:
-        state.not_ready, state.denied_at = None, -math.inf
+    if state.readiness is not readiness.NOTHING and sensors.readiness(message, profile) is TriState.TRUE:
+        state.readiness, state.denied_at = readiness.NOTHING, -math.inf
         seen.unsettled = True
     if profile.sensors.counts_internal_errors and (message.errors_count1 or message.errors_count2):
         state.internal_errors_since = state.internal_errors_since or now

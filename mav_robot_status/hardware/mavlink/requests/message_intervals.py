@@ -30,7 +30,7 @@ from ....mavlink.enumerations import (
 from ..autopilots.wanted import OUTPUT_WATCH, Once, Wanted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from ..autopilots import Autopilot
     from ..identity import Family
@@ -68,14 +68,18 @@ def wanted_of(profile: Autopilot, family: Family, watch_outputs: bool) -> tuple[
 class _Command:
     """A command that waits for its acknowledgement."""
 
-    __slots__ = ("command", "due", "older", "params", "tries", "what")
+    __slots__ = ("again", "command", "due", "older", "params", "tries", "what")
 
-    def __init__(self, command: int, params: tuple[float, float], what: str, older: int | None = None) -> None:
+    def __init__(
+        self, command: int, params: tuple[float, float], what: str, older: int | None = None, again: bool = False
+    ) -> None:
         self.command = command
         self.params = params
         self.what = what
         self.older = older
         """The command to send if this one is not supported."""
+        self.again = again
+        """Whether an acknowledgement does not end it, but only the message that it asks for."""
         self.tries = 0
         self.due = -math.inf
 
@@ -107,6 +111,8 @@ class Requests:
         self._tells = True
         """Whether the autopilot answers MAV_CMD_GET_MESSAGE_INTERVAL, as far as known."""
         self._asked_once = False
+        self.checks_asked = False
+        """Whether MAV_CMD_RUN_PREARM_CHECKS was sent, on this connection and since this boot."""
         self._begin(started)
         self._began = started
 
@@ -128,8 +134,13 @@ class Requests:
 
     def restart(self, now: float) -> None:
         """After a reboot of the autopilot all intervals are lost: start again."""
-        self._asked_once = False
+        self._asked_once = self.checks_asked = False
         self._begin(now)
+
+    def reconnected(self, now: float) -> None:
+        """The connection is a new one."""
+        self.checks_asked = False
+        self.look_again(now)
 
     def look_again(self, now: float) -> None:
         """It may have rebooted: listen, and ask for what is missing then. What still arrives is not asked for."""
@@ -164,6 +175,10 @@ class Requests:
             self._told.add(message_id)
             self._queue = deque(c for c in self._queue if not _is_met(c, message_id, rate))
 
+    def delivered(self, message_id: int) -> None:
+        """A message has arrived that is requested until it does."""
+        self._queue = deque(c for c in self._queue if not (c.again and c.params[0] == message_id))
+
     def outstanding(self) -> list[str]:
         """What was asked for and was not answered yet, in words."""
         if self._round == 0:
@@ -178,6 +193,7 @@ class Requests:
         if (ack.target_system or ack.target_component) and (ack.target_system, ack.target_component) != own:
             return
         again = ack.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED and command.tries <= RETRIES
+        again = again or (ack.result == mavlink.MAV_RESULT_ACCEPTED and command.again)
         if again or ack.result == mavlink.MAV_RESULT_IN_PROGRESS:
             command.due = now + PROGRESS
         elif command.command == MAV_CMD_GET_MESSAGE_INTERVAL:
@@ -198,11 +214,11 @@ class Requests:
                 log.debug("%d.%d refused %s: MAV_RESULT %d", *self._ids, command.what, ack.result)
 
     def due(
-        self, now: float, wanted: tuple[Wanted, ...], profile: Autopilot
+        self, now: float, wanted: tuple[Wanted, ...], profile: Autopilot, without: Collection[Once] = ()
     ) -> mav.CommandLong | mav.RequestDataStream | None:
-        """The command to send at `now`, if any; one is outstanding at a time."""
+        """The command to send at `now`, if any; one is outstanding at a time. Nothing in `without` is asked for."""
         if now >= self._look_at:
-            self._look(now, wanted, profile.requests.once)
+            self._look(now, wanted, tuple(once for once in profile.requests.once if once not in without))
         while self._streams:
             message_id, rate = self._streams.popleft()
             stream = profile.requests.streams.get(message_id)
@@ -276,7 +292,7 @@ class Requests:
             self._queue.append(_Command(MAV_CMD_SET_MESSAGE_INTERVAL, (w.id, round(1e6 / rate)), w.name))
         if not self._asked_once:
             self._asked_once = True
-            self._queue.extend(_Command(MAV_CMD_REQUEST_MESSAGE, (o.id, 0.0), o.name, o.older) for o in once)
+            self._queue.extend(_Command(MAV_CMD_REQUEST_MESSAGE, (o.id, 0.0), o.name, o.older, o.again) for o in once)
         if missing:
             log.info("requesting from vehicle %d.%d: %s", *self._ids, ", ".join(w.name for w in missing))
         self._silent = {w.id for w in wanted if not self._came(w)}

@@ -1,17 +1,21 @@
-"""The requests to all vehicles: messages and parameters, and when the next one may be due."""
+"""The requests to all vehicles: messages, parameters and pre-arm checks, and when the next one may be due."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from ....interface import LinkState
 from ....mavlink import definitions as mav
+from ....mavlink import enumerations as mavlink
 from ....mavlink.decode import text
 from ....mavlink.definitions import CommandAck, MessageInterval, ParamValue, Statustext
 from ....mavlink.enumerations import MAV_STATE_BOOT, MAV_STATE_CALIBRATING, MAV_STATE_UNINIT
+from ....values import NamedTuple
 from ..autopilots.profile import Uninit
-from ..autopilots.wanted import OUTPUT_WATCH
+from ..autopilots.wanted import METADATA, OUTPUT_WATCH, Once
+from . import prearm_checks
+from .lost_events import LostEvents
 from .message_intervals import Requests, wanted_of
 from .parameters import Parameters
 
@@ -26,6 +30,8 @@ ANSWERS: Final = frozenset(
 )
 """The messages that say something about a request."""
 
+EVENTS: Final = frozenset({mavlink.MAVLINK_MSG_ID_EVENT, mavlink.MAVLINK_MSG_ID_CURRENT_EVENT_SEQUENCE})
+
 
 class Ask(NamedTuple):
     """A message for the autopilot of one vehicle."""
@@ -38,13 +44,16 @@ class Ask(NamedTuple):
 class RequestScheduler:
     """Collects the requests that are due. It looks only when `next_due` has come, or `passive` has changed."""
 
-    def __init__(self, watch_outputs: bool, own_component: int) -> None:
+    def __init__(self, watch_outputs: bool, own_component: int, request_events: bool = True) -> None:
         self.own_component = own_component
         self.own_system: int | None = None
         """Our system id. None: the system id of the vehicle."""
         self.next_due = -math.inf
         """When (monotonic seconds) a request may be due. -inf: at once, because something has changed."""
+        self.without: frozenset[Once] = frozenset({METADATA})
+        """What is not requested even if the profile of a vehicle names it."""
         self._watch_outputs = watch_outputs
+        self._request_events = request_events
         self._passive: Container[tuple[int, int]] = ()
 
     def heard(self, tracked: TrackedVehicle, message: Any, message_id: int, now: float) -> None:
@@ -53,6 +62,8 @@ class RequestScheduler:
         if requests is None:
             return
         requests.arrived(message_id, now)
+        if message_id in EVENTS:  # one may be missing
+            self.next_due = -math.inf
         if message_id in ANSWERS:
             self._answered(requests, tracked, message, now)
 
@@ -96,7 +107,7 @@ class RequestScheduler:
         self.next_due = math.inf
         asks: list[Ask] = []
         for ids, tracked in vehicles.items():
-            if ids in passive or tracked.handle.detail.link is not LinkState.CONNECTED:
+            if ids in passive or tracked.handle.detail.link is not LinkState.CONNECTED or tracked.costly:
                 continue
             if not has_room(ids, len(asks)):
                 self.next_due = min(self.next_due, now + ROOM)
@@ -121,14 +132,28 @@ class RequestScheduler:
         wanted = wanted_of(state.profile, state.family, self._watch_outputs)
         if is_booting(tracked):
             tracked.requests.wait_for_boot(now)
-        message: Any = tracked.requests.due(now, wanted, state.profile)
+        message: Any = tracked.requests.due(now, wanted, state.profile, self.without)
         if message is None and OUTPUT_WATCH[0] in wanted:
             if tracked.parameters is None:
                 tracked.parameters = Parameters(*ids, now)
             message = tracked.parameters.due(now)
             self.next_due = min(self.next_due, tracked.parameters.next_due())
+        if message is None:
+            message = self._lost_events(ids, tracked)
+        if message is None and not tracked.requests.checks_asked and _may_be_asked(tracked, now):
+            tracked.requests.checks_asked = True
+            message = prearm_checks.command(ids)
         self.next_due = min(self.next_due, tracked.requests.next_due())
         return message
+
+    def _lost_events(self, ids: tuple[int, int], tracked: TrackedVehicle) -> Any:
+        """The request for events that did not arrive."""
+        missing = () if tracked.state is None else tracked.state.events.missing
+        if not self._request_events or (not missing and tracked.lost_events is None):
+            return None
+        if tracked.lost_events is None:
+            tracked.lost_events = LostEvents(*ids)
+        return tracked.lost_events.due(missing)
 
 
 def is_booting(tracked: TrackedVehicle) -> bool:
@@ -142,6 +167,11 @@ def is_booting(tracked: TrackedVehicle) -> bool:
     if beat.system_status in (MAV_STATE_BOOT, MAV_STATE_CALIBRATING):
         return True
     return bool(state.profile.modes.initialising.get(state.family) == beat.custom_mode)
+
+
+def _may_be_asked(tracked: TrackedVehicle, now: float) -> bool:
+    """Whether the pre-arm checks of a vehicle should run now."""
+    return prearm_checks.is_wanted(tracked, now) and _has_stayed(tracked) and not is_booting(tracked)
 
 
 def _has_stayed(tracked: TrackedVehicle) -> bool:

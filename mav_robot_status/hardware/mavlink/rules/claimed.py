@@ -5,9 +5,10 @@ Nobody can tell which of them is the vehicle. A heartbeat tells armed and mode; 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ....interface.status import RobotMode, TriState
+from ....values import NamedTuple
 from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 
 if TYPE_CHECKING:

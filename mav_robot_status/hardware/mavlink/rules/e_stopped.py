@@ -80,7 +80,7 @@ def _deduced(facts: Facts, options: HardwareOptions) -> Finding:
         return UNKNOWN, doubt
     found = _released(facts, options, watched, why)
     if facts.stop_switch and found[0] is FALSE:
-        # reversed channels and MAV_CMD_DO_AUX_FUNCTION can differ from the switch, so it is no evidence of a stop
+        # reversed channels and MAV_CMD_DO_AUX_FUNCTION can differ from the switch, so it does not prove a stop
         rule = "a switch of option 31 is in its stop position"
         return UNKNOWN, Reason(rule, Source.RC_CHANNELS, doubt=watched is not FALSE)
     return found

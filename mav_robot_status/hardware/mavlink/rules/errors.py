@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ....interface.status import ErrorCause
 from ....mavlink.enumerations import MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
+from ....values import NamedTuple
 from .. import causes
 from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 from .simulation import is_simulated
@@ -26,7 +27,8 @@ class Error(NamedTuple):
 
 def active_errors(facts: Facts) -> list[Error]:
     """Every active cause, the most important first."""
-    found = {error.cause.code: error for error in (*_announced(facts), *_counted(facts), *_faulty(facts))}
+    every = (*_of_parts(facts), *_announced(facts), *_counted(facts), *_faulty(facts))
+    found = {error.cause.code: error for error in every}
     for error in _of_state(facts, found.keys()):
         found.setdefault(error.cause.code, error)
     return sorted(found.values(), key=lambda error: error.priority)
@@ -41,6 +43,15 @@ def _announced(facts: Facts) -> Iterator[Error]:
         yield _error(causes.SYSTEM_ID_CONFLICT, None, facts.claimed.conflict_since, Source.CLAIMS)
     for code, text, since_us in facts.latched.causes:
         yield _error(code, text, since_us, Source.LATCH)
+    if facts.seldom is not None:
+        for code, text, since_us in facts.seldom.failures:
+            yield _error(code, text, since_us, Source.HIGH_LATENCY)
+
+
+def _of_parts(facts: Facts) -> Iterator[Error]:
+    """The causes that parts report. The autopilot's own text about the same cause is preferred."""
+    for code, text, since_us in facts.parts.faults:
+        yield _error(code, text, since_us, Source.PARTS)
 
 
 def _counted(facts: Facts) -> Iterator[Error]:

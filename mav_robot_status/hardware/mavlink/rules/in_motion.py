@@ -19,15 +19,16 @@ def in_motion(facts: Facts, options: HardwareOptions) -> Finding:
     landed = facts.landed_state if facts.fresh.landed_state else MAV_LANDED_STATE_UNDEFINED
     on_ground = aircraft and landed == MAV_LANDED_STATE_ON_GROUND
     if facts.armed and aircraft and landed in IN_THE_AIR and options.hover_is_motion:
+        if facts.lies and _is_still(facts):
+            return FALSE, Reason("airborne by its word, but at rest since it had no thrust", Source.LANDED_NUMBER)
         if facts.has_no_lift and _is_still(facts):
             return UNKNOWN, Reason("airborne, but still and without the throttle to fly", Source.LANDED_NUMBER)
         return TRUE, Reason("airborne", Source.LANDED_NUMBER)
     value, why = _measured(facts, on_ground)
     if why.source is Source.NONE:
         return value, why
-    if value is UNKNOWN and facts.movement.is_slow:
-        # not slow for long enough, but the land detector agrees, or the receiver has stood still for long enough
-        value = FALSE if (on_ground and not facts.armed) or _receiver_stands(facts) else UNKNOWN
+    if value is UNKNOWN and facts.movement.value is UNKNOWN and _rests(facts, on_ground):
+        value = FALSE
     if value is FALSE and facts.armed and aircraft and landed == MAV_LANDED_STATE_UNDEFINED and not _is_landed(facts):
         source = Source.VELOCITY if why.source is Source.VELOCITY else Source.NONE
         return UNKNOWN, Reason("armed, and nothing tells whether it is airborne", source)
@@ -49,6 +50,15 @@ def _measured(facts: Facts, on_ground: bool) -> Finding:
     if _receiver_stands(facts):
         return FALSE, Reason("no estimate, but the GPS receiver stands still", Source.GPS)
     return UNKNOWN, Reason("no fresh speed")
+
+
+def _rests(facts: Facts, on_ground: bool) -> bool:
+    """Whether something else shows rest while the estimate does not decide."""
+    movement = facts.movement
+    if movement.is_slow and on_ground and not facts.armed:
+        return True
+    # a disarmed vehicle below the upper thresholds: an estimate that has just begun is off by some 0.1 m/s
+    return (movement.is_slow or not (movement.is_fast or facts.armed)) and _receiver_stands(facts)
 
 
 def _is_still(facts: Facts) -> bool:

@@ -15,15 +15,19 @@ from ....mavlink.enumerations import (
 )
 from ..autopilots.profile import Uninit
 from ..causes import TERMINATION_ANNOUNCED
+from ..identity import sensor_name
+from . import high_latency
 from .drives_powered import is_initialising
 from .reason import FALSE, TRUE
 from .simulation import actuators_blocked, is_simulated
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from ....clock import Instant
     from ....interface.status import Detail
     from ..autopilots.modes import FlightMode
-    from ..facts import Facts
+    from ..facts import Facts, NotReady
     from ..options import HardwareOptions
     from .reason import Finding
 
@@ -31,32 +35,72 @@ INHIBITS: Final = (
     "LINK_STALE DISARMED E_STOPPED SAFETY_SWITCH PREARM_FAILING INITIALISING CALIBRATING POWERING_OFF TERMINATION "
     "EMERGENCY HIL SYS_STATUS_MISSING MODE_MANUAL STOP_UNCERTAIN SENDER_UNCERTAIN"
 ).split()
+MOST_REASONS: Final = 16
+"""Limit of reasons why it cannot be armed."""
+
+Named = tuple[str, "str | None"]
+"""A reason by its name, with its text."""
 
 
 def inhibits(
     facts: Facts, options: HardwareOptions, mode: FlightMode, stopped: Finding, before: Detail, now: Instant
 ) -> tuple[Inhibit, ...]:
     """Every reason why motion is not possible. `stopped` is e_stopped with its reason."""
+    if facts.seldom is not None:
+        told = high_latency.inhibits(facts.seldom, facts, options, mode)
+        return tuple(inhibit(name, None, before, now) for name in told)
+
+    def listed(reasons: Iterable[Named]) -> Iterator[Inhibit]:
+        return (inhibit(name, text, before, now) for name, text in reasons)
+
+    return (
+        *listed(_of_stop(facts, stopped)),
+        *_of_checks(facts, before, now),
+        *listed(_of_state(facts).items()),
+        *listed(_of_options(facts, options, mode)),
+    )
+
+
+def _of_stop(facts: Facts, stopped: Finding) -> Iterator[Named]:
+    """The inhibits without which a checked vehicle would have power."""
     value, why = stopped
-    reasons: dict[str, str | None] = {}
     if not facts.armed:
-        reasons["DISARMED"] = None
+        yield "DISARMED", None
     if value is TRUE:
-        reasons["E_STOPPED"] = facts.stop.text
+        yield "E_STOPPED", facts.stop.text
     elif why.doubt:
-        reasons["STOP_UNCERTAIN"] = facts.stop.text
+        yield "STOP_UNCERTAIN", facts.stop.text
     if _switch_is_on(facts):
-        reasons["SAFETY_SWITCH"] = None
-    if not facts.armed and _is_not_ready(facts):
-        reasons["PREARM_FAILING"] = facts.explained.not_ready
-    reasons |= _of_state(facts)
-    if actuators_blocked(facts, options):
-        reasons["HIL"] = None
-    if not facts.fresh.sys_status:
-        reasons["SYS_STATUS_MISSING"] = None
-    if options.manual_blocks_motion and mode.mode is RobotMode.MANUAL:
-        reasons["MODE_MANUAL"] = None
-    return tuple(inhibit(name, text, before, now) for name, text in reasons.items())
+        yield "SAFETY_SWITCH", None
+
+
+def _of_checks(facts: Facts, before: Detail, now: Instant) -> Iterator[Inhibit]:
+    """One inhibit for each reason why it cannot be armed; one of our own words, or none, if no reason is told."""
+    if facts.armed:
+        return
+    fails = _is_not_ready(facts)
+    told = (facts.arming.failing or facts.explained.not_ready) if fails else ()
+    reasons = (*told, *_refused_by_parts(facts))
+    for reason in reasons[:MOST_REASONS]:
+        yield Inhibit("PREARM_FAILING", reason.text, reason.since_us)
+    if fails and not reasons:
+        yield inhibit("PREARM_FAILING", _unhealthy(facts), before, now)
+
+
+def _refused_by_parts(facts: Facts) -> tuple[NotReady, ...]:
+    """The parts that are not ready. The autopilot decides: ArduPilot checks them only if DID_OPTIONS says so."""
+    passes = facts.fresh.sys_status and facts.sys_status.ready is TRUE
+    return () if passes else facts.parts.not_ready
+
+
+def _unhealthy(facts: Facts) -> str | None:
+    """What a PX4 shows that has not reported why: the unhealthy bits of SYS_STATUS, else the state that says so."""
+    mask = facts.sys_status.unhealthy if facts.fresh.sys_status else 0
+    names = [sensor_name(bit) for bit in range(mask.bit_length()) if mask >> bit & 1]
+    if names:
+        return f"SYS_STATUS: {', '.join(names)}"
+    is_silent = facts.kind.profile.texts.sends_events and facts.heartbeat.system_status == MAV_STATE_UNINIT
+    return "HEARTBEAT: MAV_STATE_UNINIT, no report of the arming checks yet" if is_silent else None
 
 
 def _of_state(facts: Facts) -> dict[str, str | None]:
@@ -80,11 +124,22 @@ def _of_state(facts: Facts) -> dict[str, str | None]:
     return reasons
 
 
+def _of_options(facts: Facts, options: HardwareOptions, mode: FlightMode) -> Iterator[Named]:
+    """The inhibits that depend on the site, and a missing SYS_STATUS."""
+    if actuators_blocked(facts, options):
+        yield "HIL", None
+    if not facts.fresh.sys_status:
+        yield "SYS_STATUS_MISSING", None
+    if options.manual_blocks_motion and mode.mode is RobotMode.MANUAL:
+        yield "MODE_MANUAL", None
+
+
 def _switch_is_on(facts: Facts) -> bool:
     """Whether the safety switch holds the outputs, by SYS_STATUS or by a text."""
     if facts.fresh.sys_status and facts.sys_status.safety_switch:
         return True
-    return not facts.armed and facts.explained.not_ready in facts.kind.profile.texts.safety_switch
+    texts = facts.kind.profile.texts.safety_switch
+    return not facts.armed and any(reason.text in texts for reason in facts.explained.not_ready)
 
 
 def _is_not_ready(facts: Facts) -> bool:
@@ -97,5 +152,5 @@ def _is_not_ready(facts: Facts) -> bool:
 
 def inhibit(name: str, text: str | None, before: Detail, now: Instant) -> Inhibit:
     """A reason, with the time since which it has been active without interruption."""
-    since = next((i.since_us for i in before.inhibits if i.name == name), now.unix_us)
+    since = min((i.since_us for i in before.inhibits if i.name == name), default=now.unix_us)
     return Inhibit(name, text, since)

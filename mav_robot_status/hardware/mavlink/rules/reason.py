@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import NamedTuple
 
 from ....interface.status import TriState
+from ....values import NamedTuple
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 
@@ -32,6 +32,7 @@ class Source(Enum):
     APPLET_AND_OUTPUTS = "RS_STOP against SERVO_OUTPUT_RAW"
     RC_CHANNELS = "RC_CHANNELS, with RCn_OPTION"
     LATCH = "what announced a cause"
+    PARTS = "what faulty parts reported"
     CLAIMS = "what the senders with these ids say"
     ESC = "ESC telemetry"
     OUTPUTS = "SERVO_OUTPUT_RAW"
@@ -40,6 +41,7 @@ class Source(Enum):
     VELOCITY = "the message that gives the speed"
     GPS = "GPS_RAW_INT"
     ATTITUDE = "ATTITUDE"
+    HIGH_LATENCY = "HIGH_LATENCY2"
 
 
 class Reason(NamedTuple):

@@ -6,7 +6,9 @@ and once a second. The autopilot knows it, so it stands above texts, pre-arm che
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
+
+from ....values import NamedTuple
 
 if TYPE_CHECKING:
     from ....mavlink.definitions import NamedValueFloat

@@ -7,8 +7,9 @@ A boot cannot be earlier than the last sample of the run before it: a tunnel rep
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
+
+from ....values import dataclass
 
 STEP_BACK_MS: Final = 2000
 STEP_BACK: Final = STEP_BACK_MS / 1000  # seconds
@@ -51,6 +52,10 @@ def heard_clock(boot: BootClock, time_boot_ms: int, now: float) -> bool:
     """Process one sample. True if it changes the boot time: by a correction or a reboot (`rebooted`)."""
     booted = now - time_boot_ms / 1000
     clock_ms = boot.clock_ms
+    is_next = boot.doubt_ms is None and clock_ms is not None and 0 < time_boot_ms - clock_ms < HALF
+    if is_next and 0 <= booted - boot.at < STEP_BACK:
+        boot.clock_ms = time_boot_ms  # nearly every sample
+        return False
     if clock_ms is None or clock_ms < time_boot_ms < clock_ms + HALF or time_boot_ms < clock_ms - HALF:  # it wraps
         # transport only delays samples, so the earliest boot time is the most accurate
         boot.clock_ms = time_boot_ms

@@ -7,6 +7,8 @@ state, but they are held against the selected way:
 - A live claim that is armed makes a disarmed selected way doubtful at once.
 - Claims that differ for longer than a slow way explains, or in what no vehicle changes, are a conflict.
 - A silent way gives way to one that does not contradict it; to one that does only when the vehicle is lost.
+- A HIGH_LATENCY2 is a statement as a HEARTBEAT is (`high_latency.stated`). It comes seldom, so it counts for longer; it
+  never takes the place of a HEARTBEAT that arrives, and gives way to one at once.
 
 No I/O and no clock: time is an argument, in monotonic seconds.
 """
@@ -16,9 +18,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Final, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
+from ....values import NamedTuple
 from .boot_clock import APART
+from .high_latency import LEAST_TIMEOUT, is_statement, tells_armed
 from .turns import Turns, is_armed
 
 if TYPE_CHECKING:
@@ -46,13 +50,15 @@ CONTINUES: Final = 48
 COUNTED_APART: Final = 42
 """MISSION_CURRENT: Betaflight counts its sequence numbers apart from those of all other messages (recorded)."""
 SIGNED_LASTS: Final = 30.0
-"""Seconds after a verified frame in which frames without a verified signature are no claims."""
+"""Seconds after a verified frame in which frames without a verified signature are not claims."""
 MOST_CLAIMS: Final = 8
 MOST_COPIES: Final = 16
 
 CLOCKS: Final = frozenset({2, 30, 32, 33})
 """Message ids with time_boot_ms: SYSTEM_TIME, ATTITUDE, positions."""
 NEVER: Final = -math.inf
+BESIDE: Final = "HIGH_LATENCY2"
+"""With a way, the key of a claim by HIGH_LATENCY2: it does not replace what the HEARTBEATs of the way say."""
 
 C = TypeVar("C")
 """A way: any hashable value."""
@@ -97,14 +103,16 @@ class Claim:
         "way",
     )
 
-    def __init__(self, way: Any, heartbeat: Heartbeat, sequence: int, at: float) -> None:
+    def __init__(
+        self, way: Any, heartbeat: Heartbeat, sequence: int, at: float, counts_from: float | None = None
+    ) -> None:
         self.way, self.heartbeat, self.at = way, heartbeat, at
-        self.armed_at = at if is_armed(heartbeat) else NEVER
+        self.armed_at = (at if counts_from is None else counts_from) if is_armed(heartbeat) else NEVER
         """When this count of sequence numbers said armed. NEVER if it said disarmed since."""
         self.former_at = NEVER
         """When another count last said armed. Nothing but time ends that."""
         self.copied = False
-        """Whether a router copied it from another way: then it is no claim of its own."""
+        """Whether a router copied it from another way: then it is not a claim of its own."""
         self.booted: float | None = None
         """When its autopilot booted, if it sent a clock."""
         self.number = self.sequence = sequence
@@ -130,12 +138,18 @@ class Claim:
             self.broken = True
         self.sequence = sequence
 
-    def hear(self, heartbeat: Heartbeat, sequence: int, at: float, *, signed: bool = False) -> bool:
-        """Note a heartbeat. Returns whether it continues the count: then the sender of the one before sent it."""
+    def hear(
+        self, heartbeat: Heartbeat, sequence: int, at: float, counts_from: float | None = None, *, signed: bool = False
+    ) -> bool:
+        """Note a heartbeat. Returns whether it continues the count: then the sender of the one before sent it.
+
+        It counts for LIVE seconds from `counts_from` on; None: from `at` on.
+        """
         continues = signed or not (self.broken or (sequence == self.number and self.counts))
         if not continues:
             self.former_at = max(self.former_at, self.armed_at)
-        self.armed_at = at if is_armed(heartbeat) else NEVER
+        if tells_armed(heartbeat):
+            self.armed_at = (at if counts_from is None else counts_from) if is_armed(heartbeat) else NEVER
         if sequence != self.number:
             self.number, self.counts = sequence, True
         self.broken, self.heartbeat, self.at = False, heartbeat, at
@@ -156,10 +170,12 @@ class Claims(Generic[C]):
         "conflict",
         "differed_at",
         "disarmed_at",
+        "lasts",
         "mine",
         "news",
         "others",
         "sequence",
+        "timeout",
         "unused",
         "verified_at",
         "way",
@@ -168,6 +184,8 @@ class Claims(Generic[C]):
     def __init__(self) -> None:
         self.unused = 0
         """Frames on ways that were not selected."""
+        self.timeout: float | None = None
+        """Seconds after which the link of the selected way counts as lost, if the site says so. The owner sets this."""
         self.forget()
 
     def forget(self) -> None:
@@ -189,6 +207,8 @@ class Claims(Generic[C]):
         """When any sender but the selected one said armed; disarmed; and when two did not say the same."""
         self.verified_at = NEVER
         """When the latest frame with a verified signature arrived."""
+        self.lasts = LEAST_TIMEOUT
+        """Seconds for which a HIGH_LATENCY2 counts: as long as the status made of it. The owner sets it."""
         self._apart_since: float | None = None
         self._proofs = 0
         self._proofs_since = 0.0
@@ -202,14 +222,14 @@ class Claims(Generic[C]):
         """Process a heartbeat on the selected way. The first one selects its way."""
         at, mine = now.mono, self.mine
         if mine is None:
-            self.way, self.mine = way, Claim(way, heartbeat, sequence, at)
+            self.way, self.mine = way, Claim(way, heartbeat, sequence, at, self._counts_from(heartbeat, at))
             self._turns.heard(heartbeat, at)
         elif heartbeat == mine.heartbeat and not self.broken:
             if sequence != mine.number:
                 mine.number, mine.counts = sequence, True
             mine.at = at
-            if is_armed(heartbeat):  # also if it was a copy before: this is no copy
-                mine.armed_at = at
+            if is_armed(heartbeat):  # also if it was a copy before: this is not a copy
+                mine.armed_at = self._counts_from(heartbeat, at)
         else:
             self._changed(mine, heartbeat, sequence, now)
         self.sequence, self.broken = sequence, False
@@ -218,6 +238,12 @@ class Claims(Generic[C]):
                 self._copies.append((sequence, heartbeat, at))
             self._compare(None, now)
 
+    def follow_own(self, sequence: int) -> None:
+        """Note the sequence number of a frame on the selected way, if the owner does not."""
+        if (sequence - self.sequence) & 255 > CONTINUES:
+            self.broken = True
+        self.sequence = sequence
+
     def _changed(self, mine: Claim, heartbeat: Heartbeat, sequence: int, now: Instant) -> None:
         """Something else is said on the selected way: by the vehicle, or by a second sender on it?"""
         before, armed_at = mine.heartbeat, mine.doubt_at
@@ -225,7 +251,10 @@ class Claims(Generic[C]):
         if _stance(heartbeat) != _stance(before):
             self.differed_at = now.mono
         mine.broken = self.broken
-        continues = mine.hear(heartbeat, sequence, now.mono, signed=self.is_signed(now.mono))
+        counts_from = self._counts_from(heartbeat, now.mono)
+        continues = mine.hear(heartbeat, sequence, now.mono, counts_from, signed=self.is_signed(now.mono))
+        if is_statement(heartbeat) and is_armed(before) and not continues:
+            mine.former_at = max(mine.former_at, counts_from)
         if _kind(heartbeat) != _kind(before) and is_armed(before) and not mine.armed:
             mine.former_at = armed_at  # no vehicle becomes another one
         if mine.armed and not is_armed(before) and not continues and now.mono - armed_at <= HOLD:
@@ -285,12 +314,15 @@ class Claims(Generic[C]):
         if self.is_signed(at):
             return Outcome.UNUSED
         claim = self.others.get(way)
-        if at - mine.at > SILENCE:
+        better = is_statement(mine.heartbeat) and not is_statement(heartbeat)
+        if at - mine.at > SILENCE or better:
             other_clock = claim is not None and _are_apart(claim.booted, booted)
             other_kind = _kind(heartbeat) != _kind(mine.heartbeat)
-            contradicts = other_clock or other_kind or (mine.armed and not is_armed(heartbeat))
-            if not contradicts or at - mine.at > timeout:
+            disarmed = not better and _disarms(heartbeat, mine.heartbeat)
+            if not (other_clock or other_kind or disarmed) or at - mine.at > timeout:
                 ran_before = claim is not None and claim.booted is not None and claim.booted < mine.at
+                if disarmed and is_statement(heartbeat):
+                    mine.armed_at = self._counts_from(heartbeat, at)
                 self._select(way, mine, claim)
                 return Outcome.EXCHANGED if other_kind or (other_clock and ran_before) else Outcome.SELECTED
         if not self._is_copy(heartbeat, sequence, at):
@@ -302,13 +334,36 @@ class Claims(Generic[C]):
             claim.copied, claim.armed_at = True, NEVER
         return Outcome.UNUSED
 
+    def beside(self, statement: Heartbeat, sequence: int, way: C, now: Instant) -> None:
+        """Process what a HIGH_LATENCY2 says while HEARTBEATs arrive on the selected way. It selects no way.
+
+        On that way it is from the vehicle, unless it is of another kind, or says armed while the HEARTBEATs do not.
+        """
+        mine = self.mine
+        if mine is None or self.is_signed(now.mono):
+            return
+        is_other = _kind(statement) != _kind(mine.heartbeat)
+        if is_other:
+            self.contradict("HIGH_LATENCY2.type and autopilot differ from HEARTBEAT", way, now)
+        key = BESIDE, way
+        agrees = mine.armed or not is_armed(statement)
+        if way is self.way and not is_other and agrees and key not in self.others:
+            return
+        former = self.others.get(way)
+        if former is not None and is_statement(former.heartbeat):  # from when its way was selected
+            self.others[key] = self.others.pop(way)
+        if key in self.others:
+            self.others[key].follow(sequence)
+        self.claim(key, way, statement, sequence, now)
+
     def claim(self, key: Hashable, way: Any, heartbeat: Heartbeat, sequence: int, now: Instant) -> None:
         """Note what another sender says. `key` identifies it: its way, or its ids if they are not these."""
         claim = self.others.get(key)
+        counts_from = self._counts_from(heartbeat, now.mono)
         if claim is None:
-            self._remember(key, Claim(way, heartbeat, sequence, now.mono))
+            self._remember(key, Claim(way, heartbeat, sequence, now.mono, counts_from))
         else:
-            claim.hear(heartbeat, sequence, now.mono)
+            claim.hear(heartbeat, sequence, now.mono, counts_from)
             claim.copied = False
         self._note(heartbeat, now.mono)
         if self.mine is not None and _stance(heartbeat) != _stance(self.mine.heartbeat):
@@ -378,23 +433,27 @@ class Claims(Generic[C]):
             claim.hear(heartbeat, sequence, at)
             claim.copied, claim.armed_at = True, min(claim.armed_at, armed_at)
 
+    def _counts_from(self, heartbeat: Heartbeat, at: float) -> float:
+        """From when on a heartbeat counts for LIVE seconds: a statement of a HIGH_LATENCY2 counts until `lasts`."""
+        return at + self.lasts - LIVE if is_statement(heartbeat) else at
+
     def _note(self, heartbeat: Heartbeat, at: float) -> None:
         """Note what is said beside the selected way, or no longer on it: for what all agree on during a conflict."""
-        if is_armed(heartbeat):
+        if is_armed(heartbeat) or not tells_armed(heartbeat):
             self.armed_at = max(self.armed_at, at)  # a way that is selected again may have said it long ago
-        else:
+        if not is_armed(heartbeat):
             self.disarmed_at = max(self.disarmed_at, at)
 
     def _compare(self, speaker: Hashable | None, now: Instant) -> None:
         """Hold the live claims against the selected way, after a heartbeat of `speaker` (None: the selected way)."""
         at, mine = now.mono, self.mine
-        for key in [key for key, claim in self.others.items() if at - claim.at > HOLD]:
+        for key in [key for key, claim in self.others.items() if at - max(claim.at, claim.doubt_at) > HOLD]:
             del self.others[key]
-        if mine is None or at - mine.at > LIVE:
+        if mine is None or at - self._counts_from(mine.heartbeat, mine.at) > LIVE:
             return
         differing = None
         for key, claim in self.others.items():
-            if claim.copied or at - claim.at > LIVE:
+            if claim.copied or at - claim.at > LIVE or is_statement(claim.heartbeat):
                 continue
             if claim.armed != mine.armed or (key == claim.way and _stance(claim.heartbeat) != _stance(mine.heartbeat)):
                 differing = claim
@@ -417,6 +476,13 @@ def _kind(heartbeat: Heartbeat) -> tuple[int, int]:
 def _stance(heartbeat: Heartbeat) -> tuple[int, ...]:
     """What one vehicle says alike on all its ways."""
     return heartbeat.autopilot, heartbeat.type, heartbeat.base_mode, heartbeat.custom_mode
+
+
+def _disarms(heartbeat: Heartbeat, before: Heartbeat) -> bool:
+    """Whether a heartbeat takes back that a vehicle is armed, or that it may be."""
+    if tells_armed(before):
+        return is_armed(before) and not is_armed(heartbeat)
+    return tells_armed(heartbeat) and not is_armed(heartbeat)
 
 
 def _are_apart(one: float | None, other: float | None) -> bool:

@@ -19,9 +19,10 @@ texts.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ....interface.status import TriState
+from ....values import NamedTuple
 from .sensors import readiness, safety_switch_on
 
 if TYPE_CHECKING:

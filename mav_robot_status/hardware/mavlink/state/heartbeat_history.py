@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ....mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED, MAV_STATE_CRITICAL
+from ....values import NamedTuple
 
 if TYPE_CHECKING:
     from ....clock import Instant

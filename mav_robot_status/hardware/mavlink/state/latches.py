@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
+from ....values import NamedTuple
 from ..causes import CAUSES, EVENTS, TERMINATION_ANNOUNCED, TIMED_TEXTS, Clears
 
 if TYPE_CHECKING:

@@ -5,10 +5,11 @@ The last sample holds until the next.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Final
 
 from ....interface.status import TriState
+from ....values import dataclass
 
 if TYPE_CHECKING:
     from ..options import HardwareOptions
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 RATE_ON, RATE_OFF = 0.15, 0.08  # rad/s
 SUSTAIN_ON, SUSTAIN_OFF = 0.3, 1.0  # seconds
+GAP: Final = 2.5  # seconds in which a vehicle may move and stop again unseen
 
 
 @dataclass(slots=True)
@@ -27,8 +29,12 @@ class Motion:
     """Since when above the upper thresholds."""
     slow_since: float | None = None
     """Since when below the lower thresholds."""
+    still_since: float | None = None
+    """Since when below the lower thresholds, by samples that are not further apart than GAP."""
     speed: float | None = None
     """The latest sample, m/s; None while there is no estimate."""
+    at: float = -math.inf
+    """When it arrived."""
 
 
 def settled(motion: Motion, now: float) -> TriState:
@@ -45,20 +51,38 @@ def settle(motion: Motion, now: float) -> None:
     motion.value = settled(motion, now)
 
 
-def moved(motion: Motion, speed: float | None, rate: float, armed: bool, options: HardwareOptions, now: float) -> None:
-    """Process one sample: `speed` in m/s (None: not measured, which ends all that was known), `rate` in rad/s."""
-    motion.speed = speed
+def moved(motion: Motion, speed: float | None, rate: float, armed: bool, options: HardwareOptions, now: float) -> bool:
+    """Process one sample: `speed` in m/s (None: not measured, which ends all that was known), `rate` in rad/s.
+
+    True if that has changed nothing but `speed`, which was measured before too, and `at`.
+    """
     if speed is None:
-        motion.value, motion.fast_since, motion.slow_since = UNKNOWN, None, None
-        return
-    motion.value = settled(motion, now)
+        motion.speed = None
+        motion.value, motion.fast_since, motion.slow_since, motion.still_since = UNKNOWN, None, None, None
+        return False
+    value, fast, slow = motion.value, motion.fast_since, motion.slow_since
     on = options.v_on if armed else options.v_on_disarmed
+    if value is TRUE and fast is not None and slow is None and (rate > RATE_ON or speed > on):
+        motion.speed, motion.at = speed, now  # it goes on moving: most samples of a flight
+        return True
+    was_measured, motion.speed, still = motion.speed is not None, speed, motion.still_since
+    motion.value = settled(motion, now)
     off = options.v_off if armed else options.v_off_disarmed
     if not (speed > on or rate > RATE_ON):
         motion.fast_since = None
     elif motion.fast_since is None:
         motion.fast_since = now
     if not (speed < off and rate < RATE_OFF):
-        motion.slow_since = None
+        motion.slow_since = motion.still_since = None
     elif motion.slow_since is None:
-        motion.slow_since = now
+        motion.slow_since = motion.still_since = now
+    elif now - motion.at > GAP:
+        motion.still_since = now
+    motion.at = now
+    return (
+        was_measured
+        and motion.value is value
+        and motion.fast_since == fast
+        and motion.slow_since == slow
+        and motion.still_since == still
+    )

@@ -9,10 +9,11 @@ grows. A motor that is switched off while armed, without such proof, is only a r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Final
 
 from ....mavlink import enumerations as mavlink
+from ....values import dataclass
 from ..identity import PLANE, ROVER, Family
 
 if TYPE_CHECKING:

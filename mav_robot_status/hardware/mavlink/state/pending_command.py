@@ -7,13 +7,14 @@ neither the function nor the position: it counts only if all outstanding command
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ....mavlink.enumerations import (
     MAV_CMD_DO_AUX_FUNCTION,
     MAV_CMD_DO_FLIGHTTERMINATION,
     MAV_RESULT_IN_PROGRESS,
 )
+from ....values import NamedTuple
 from .estop import MOTOR_ESTOP
 
 if TYPE_CHECKING:

@@ -6,10 +6,11 @@ The profile defines the meaning of a faulty bit.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ....interface.status import TriState
 from ....mavlink import enumerations as mavlink
+from ....values import NamedTuple
 from ..autopilots.sensor_weights import EXTENDED_BITS, HARD, SOFT, Weight, bit_of
 
 if TYPE_CHECKING:
@@ -59,6 +60,13 @@ def faulty_mask(status: SysStatus, profile: Autopilot) -> int:
             more &= status.onboard_control_sensors_present_extended
         mask |= more << 32
     return mask
+
+
+def unhealthy_mask(status: SysStatus) -> int:
+    """The bits that are enabled and not healthy, present or not, without PREARM_CHECK; the extended word from 32 up."""
+    mask = status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health & ~PREARM_CHECK
+    more = status.onboard_control_sensors_enabled_extended & ~status.onboard_control_sensors_health_extended
+    return mask | more << 32
 
 
 def heard_faults(faults: Faults, mask: int, now: Instant) -> Faults:

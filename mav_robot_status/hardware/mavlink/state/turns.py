@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from ....mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
+from ....values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable

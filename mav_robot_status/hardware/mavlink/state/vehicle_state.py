@@ -8,18 +8,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import field
+from typing import TYPE_CHECKING, Any
 
 from ....clock import Instant
-from ....mavlink.enumerations import MAV_VTOL_STATE_UNDEFINED
+from ....mavlink.enumerations import MAV_VTOL_STATE_MC, MAV_VTOL_STATE_UNDEFINED
+from ....values import NamedTuple, dataclass
 from ..autopilots import announced_as
-from ..identity import Family, family_of, sensor_name
-from . import estop, latches, outputs, pending_command, sensors, text_assembly
+from ..identity import FIXED_PITCH, Family, family_of, sensor_name
+from . import (
+    arming_report,
+    estop,
+    event_sequence,
+    high_latency,
+    latches,
+    outputs,
+    parts,
+    pending_command,
+    sensors,
+    text_assembly,
+)
+from . import readiness as reasons
 from .boot_clock import BootClock
 from .claims import Claims
 from .heartbeat_history import HeartbeatHistory, first_heartbeat
 from .latest_messages import LatestMessages, heard
+from .lift import Lift
 from .motion import Motion
 
 if TYPE_CHECKING:
@@ -29,7 +43,9 @@ if TYPE_CHECKING:
     from ..autopilots.modes import AvailableMode
     from ..autopilots.sensor_weights import Weight
     from ..options import HardwareOptions
+    from ..px4_events import EventTable
     from .applet import Applet
+    from .high_latency import HighLatency
 
 
 class Statement(NamedTuple):
@@ -66,6 +82,7 @@ class VehicleState:
     motion: Motion = field(default_factory=Motion)
     gps_motion: Motion = field(default_factory=Motion)
     """The motion according to the GPS receiver; only used while the autopilot has no estimate."""
+    lift: Lift = field(default_factory=Lift)
     unaided: bool = False
     """Whether ArduPilot's estimator reports that its position is not measured."""
     unaided_at: float = -math.inf
@@ -85,8 +102,9 @@ class VehicleState:
     modes: Mapping[int, AvailableMode] = field(default_factory=dict)
     firmware: ToldFirmware | None = None
     """The version of the autopilot's firmware, if it reported it since its boot."""
-    not_ready: Statement | None = None
-    """The reason why it cannot be armed."""
+    readiness: reasons.Readiness = reasons.NOTHING
+    """The reasons why it cannot be armed."""
+    faulty_parts: parts.Faults = field(default_factory=dict)
     failsafe: Statement | None = None
     """The text about a failsafe that its state reports."""
     failsafe_cleared: float | None = None
@@ -102,20 +120,26 @@ class VehicleState:
     """Words of the applet without a meaning."""
     reports_mission: bool = False
     """Whether MISSION_CURRENT has a mission_state."""
+    high_latency: HighLatency | None = None
+    """What HIGH_LATENCY2 says, if that is all that the vehicle sends. None: it sends HEARTBEATs."""
     armed_after: SysStatus | None = None
     """The latest SYS_STATUS before the arming, or before the connection to an armed vehicle."""
     stop_switch_at: float = -math.inf
     """When a switch of option 31 was last in its stop position, monotonic seconds."""
     assumed_free: bool = False
     """`estop_assume_visible`: no e-stop was engaged when it was armed."""
-    event: int | None = None
-    """The sequence number of the latest EVENT."""
+    events: event_sequence.EventSequence = event_sequence.NOTHING
+    """The latest EVENTs of PX4."""
+    arming: arming_report.ArmingReport = arming_report.NOTHING
+    """Its latest report of the arming checks."""
     boots: int = 0
     """Reboots seen."""
     started_at: float | None = None
     """When the autopilot sent a text that it sends only while it starts, since the last heartbeat."""
     claims: Claims[Any] = field(default_factory=Claims, compare=False)
     """Who speaks with its ids. It outlives reboots, and the vehicle itself."""
+    event_table: EventTable | None = field(default=None, compare=False)
+    """The words for its events. It is given from outside, and outlives reboots."""
 
     profile: Autopilot = field(init=False)
     """The meaning of its messages."""
@@ -145,9 +169,10 @@ class VehicleState:
         return frozenset(bit for bit, _, _ in self.counting_faults(options)) if self.faults else frozenset()
 
     def become(self, other: VehicleState) -> None:
-        """Replace everything by the contents of `other`."""
+        """Replace everything by the contents of `other`, except for what is given from outside."""
         for name in self.__slots__:
-            setattr(self, name, getattr(other, name))
+            if name != "event_table":
+                setattr(self, name, getattr(other, name))
 
     def show(self, profile: Autopilot) -> None:
         """Note that its software is this one, although it announces another one."""
@@ -169,10 +194,26 @@ def begin(heartbeat: Heartbeat, now: Instant, claims: Claims[Any] | None = None)
     )
 
 
+def timeout_of(state: VehicleState, options: HardwareOptions) -> float:
+    """Seconds without a heartbeat after which the link of a vehicle counts as lost."""
+    if state.claims.timeout is not None:
+        return state.claims.timeout
+    if state.high_latency is None:
+        return options.heartbeat_timeout
+    return max(high_latency.timeout(state.high_latency), options.heartbeat_timeout)
+
+
 def honours_stop(state: VehicleState) -> bool:
     """Whether a stop by switch or command stops the motors of this vehicle."""
     honoured_by = state.profile.stops.honoured_by
     return honoured_by is not None and state.family in honoured_by
+
+
+def is_multicopter(state: VehicleState) -> bool:
+    """Whether only the thrust of its motors can hold it in the air, and VFR_HUD.throttle is that thrust."""
+    if not state.profile.speeds.hud_shows_thrust:
+        return False
+    return state.vehicle_type in FIXED_PITCH or vtol_state(state) == MAV_VTOL_STATE_MC
 
 
 def vtol_state(state: VehicleState) -> int:

@@ -5,7 +5,7 @@ import { draw, make } from "./make.js";
 
 const WINDOW = 600; // s
 const ROWS = [...FIELDS, LINK];
-const FORMS = new Map([[true, "full"], [false, "low"], ["AUTO", "full"], ["MANUAL", "half"], ["CONNECTED", "low"], ["LOST", "full"]]);
+const FORMS = { full: [0, 20], half: [8, 12], line: [16, 4], hatched: [0, 20] };
 
 /** The stretches of one field as [from, to, value], in seconds before now, oldest first. */
 export function stretches(name, transitions, present, knownFor, dataUntil) {
@@ -31,12 +31,12 @@ export function bands(line, history, dataUntil, now) {
       const look = looks(field, value);
       const words = `${look.word} from ${clock(now - from * 1000)} for ${span(from - to)}`;
       labels.push(words);
-      const rect = stretch(from, to, FORMS.get(value) ?? "hatched", look.tone);
+      const rect = stretch(from, to, look);
       rect.append(draw("title", {}, `${field.title}: ${words}`));
       drawing.append(rect);
     }
     drawing.setAttribute("aria-label", `${field.title}: ${labels.slice(-5).join("; ") || "no data"}`);
-    return make("div", { class: "row" }, make("span", {}, field.head), drawing);
+    return make("div", { class: "row" }, make("span", {}, field.title), drawing);
   });
   const marks = [10, 8, 6, 4, 2].map((minutes) => make("span", {}, minutes === 10 ? "10 min" : `${minutes}`));
   const axis = make("div", { class: "row axis", "aria-hidden": "true" }, make("span"), make("div", {}, ...marks, make("span", {}, "now")));
@@ -44,9 +44,9 @@ export function bands(line, history, dataUntil, now) {
   return [...rows, axis, key];
 }
 
-function stretch(from, to, form, tone) {
-  const [y, height] = { full: [0, 20], half: [8, 12], low: [16, 4], hatched: [0, 20] }[form];
+function stretch(from, to, { bar, tone }) {
+  const [y, height] = FORMS[bar];
   const x = 100 * (1 - from / WINDOW);
   const width = Math.max((100 * (from - to)) / WINDOW, 0.25);
-  return draw("rect", { x: `${x}%`, width: `${width}%`, y, height, class: `${form} ${tone}` });
+  return draw("rect", { x: `${x}%`, width: `${width}%`, y, height, class: `${bar} ${tone}` });
 }

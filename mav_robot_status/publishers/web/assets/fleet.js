@@ -1,52 +1,78 @@
-// The table of all vehicles. Rows are updated in place, so that keyboard focus is kept.
+// The table of robots, one line each, and that of the members of a group. Rows are updated in place, so that keyboard
+// focus is kept.
 
-import { FIELDS, LINK, looks, span } from "./words.js";
-import { chip, isolated, make, setText } from "./make.js";
+import { FIELDS, LINK, looks, plain, span } from "./words.js";
+import { chip, make, setText, told } from "./make.js";
+import { ids, kind, members, title } from "./robot.js";
 
-const COLUMNS = ["Vehicle", ...FIELDS.map((field) => field.head), "Why", LINK.head];
+const HELD = 2; // s after a movement of the pointer over the table during which no row changes its place
+const FIELD_COLUMNS = FIELDS.map((field) => ({ head: field.head, field, of: (robot) => place(field, robot.value(field.name)) }));
+const COLUMNS = [
+  { head: "State", of: (robot) => robot.headline().rank },
+  { head: "Robot", of: () => 0 },
+  { head: "Why" },
+  ...FIELD_COLUMNS,
+  { head: LINK.head, of: (robot) => -place(LINK, robot.line.link?.state) },
+];
 
-/** The title of a vehicle: its handle, or its system id for a default handle. */
-export function title(line) {
-  const handle = String(line.handle ?? "?");
-  if (!/^industrial_robot_status_handle(\/\d+\.\d+)?$/.test(handle)) return handle;
-  return line.system === null || line.system === undefined ? handle : `System ${line.system}`;
+const NAMES = new Intl.Collator("en", { numeric: true });
+const moves = ({ line }) => line.motion_possible === true || line.in_motion === true;
+const FILTERS = [
+  { name: "All", tone: "calm", has: () => true },
+  { name: "In error", tone: "alarm", has: (robot) => robot.value("in_error") === true },
+  { name: "E-stopped", tone: "alarm", has: (robot) => robot.value("e_stopped") === true },
+  { name: "Not heard", tone: "warning", has: (robot) => !robot.heard() },
+  { name: "Can move", tone: "active", has: (robot) => robot.heard() && moves(robot) },
+];
+
+/** The place of a value in the table of looks. */
+function place(field, value) {
+  const found = [...field.looks.keys()].indexOf(value ?? null);
+  return found < 0 ? field.looks.size : found;
 }
 
-/** Ids, autopilot with its firmware, and type in one line. */
-export function kind(line) {
-  const ids = line.system === null || line.system === undefined ? null : `${line.system}.${line.component}`;
-  const autopilot = [line.vehicle?.autopilot, line.vehicle?.firmware].filter((part) => part).join(" ");
-  return [ids, autopilot, line.vehicle?.type].filter((part) => part).join(" · ");
-}
-
-/** Errors and reasons why motion is not possible, as list items. */
-export function causes(line) {
-  const items = [];
-  for (const [group, tone] of [["errors", "danger"], ["inhibits", "plain"]]) {
-    for (const cause of Array.isArray(line[group]) ? line[group] : []) {
-      const code = group === "errors" ? `${cause.code} ` : "";
-      const item = make("li", { class: tone }, make("b", {}, code + String(cause.name)));
-      if (cause.text) item.append(" ", isolated(`“${cause.text}”`));
-      items.push([item, cause]);
-    }
+/** Sorted by a column, then by name. A group is where its first member or itself would be, its members below it. */
+export function sorted(robots, column = COLUMNS[0], down = false) {
+  const keys = new Map(robots.map((robot) => [robot, column.of(robot)]));
+  const byHandle = new Map(robots.map((robot) => [robot.line.handle, robot]));
+  const below = new Map();
+  for (const robot of robots) {
+    const own = members(robot.line).map((handle) => byHandle.get(handle)).filter((one) => one && one !== robot);
+    if (own.length) below.set(robot, own);
   }
-  return items;
+  for (const [group, own] of below) keys.set(group, Math.min(keys.get(group), ...own.map((one) => keys.get(one))));
+  const names = new Map(robots.map((robot) => [robot, title(robot.line)]));
+  const order = [...robots].sort(
+    (a, b) => (down ? -1 : 1) * (keys.get(a) - keys.get(b) || NAMES.compare(names.get(a), names.get(b))) || (a.line.handle < b.line.handle ? -1 : 1),
+  );
+  const inGroups = new Set([...below.values()].flat());
+  const top = order.filter((robot) => !inGroups.has(robot) || below.has(robot));
+  return [...new Set([...top.flatMap((robot) => [robot, ...(below.get(robot) ?? [])]), ...order])];
 }
 
-export class Fleet {
-  constructor() {
+/** The rows of some robots. */
+export class Rows {
+  constructor(head, body) {
     this.rows = new Map();
-    this.body = document.getElementById("rows");
-    for (const name of COLUMNS) document.getElementById("head").append(make("th", { role: "columnheader", scope: "col" }, name));
+    this.body = document.getElementById(body);
+    this.head = document.getElementById(head);
+    for (const column of COLUMNS) this.head.append(this.header(column));
   }
 
-  /** Show these vehicles, in this order. */
-  show(vehicles) {
+  header({ head, field }) {
+    return make("th", { role: "columnheader", scope: "col", class: field ? "field" : head.toLowerCase() }, head);
+  }
+
+  /** Show these robots, in this order. */
+  show(robots) {
+    const focused = document.activeElement;
     const seen = new Set();
+    const below = new Set(robots.flatMap(({ line }) => members(line)));
     let after = null;
-    for (const vehicle of vehicles) {
-      const row = this.row(vehicle);
-      seen.add(vehicle.line.handle);
+    for (const robot of robots) {
+      const row = this.row(robot);
+      row.classList.toggle("member", below.has(robot.line.handle));
+      seen.add(robot.line.handle);
       const next = after === null ? this.body.firstChild : after.nextSibling;
       if (next !== row) this.body.insertBefore(row, next);
       after = row;
@@ -56,59 +82,162 @@ export class Fleet {
       row.remove();
       this.rows.delete(handle);
     }
-    const errors = vehicles.filter(({ line }) => line.in_error === true).length;
-    const lost = vehicles.filter(({ line }) => line.link?.state !== "CONNECTED").length;
-    const count = vehicles.length === 1 ? "1 vehicle" : `${vehicles.length} vehicles`;
-    setText(document.getElementById("count"), `${count}, ${errors} in error, ${lost} without a link`);
-    document.getElementById("count").hidden = vehicles.length === 0;
-    document.getElementById("empty").hidden = vehicles.length > 0;
-    document.title = `${errors ? `(${errors}!) ` : ""}RobotStatus`;
+    // a row that moves loses the focus
+    if (this.body.contains(focused) && document.activeElement !== focused) focused.focus({ preventScroll: true });
   }
 
   /** Update the age of each heartbeat. */
-  age(vehicles) {
-    for (const vehicle of vehicles) {
-      const known = this.rows.get(vehicle.line.handle);
+  age(robots) {
+    for (const robot of robots) {
+      const known = this.rows.get(robot.line.handle);
       if (!known) continue;
-      setText(known.age, vehicle.line.link?.state === "NEVER_SEEN" ? "" : span(vehicle.currentAge()));
-      known.row.classList.toggle("stale", vehicle.stale());
+      setText(known.age, robot.line.link?.state === "NEVER_SEEN" ? "" : span(robot.currentAge()));
+      if (known.stale !== robot.stale()) this.row(robot);
     }
   }
 
-  row(vehicle) {
-    const { line } = vehicle;
+  row(robot) {
+    const { line } = robot;
     let known = this.rows.get(line.handle);
-    if (known?.line === line) return known.row;
+    if (known?.said === robot.said && known.line === line && known.stale === robot.stale()) return known.row;
     if (!known) {
       known = { row: make("tr", { role: "row" }), link: make("a", { href: `#/${encodeURIComponent(line.handle)}` }), age: make("span", { class: "age" }) };
-      known.head = make("th", { role: "rowheader", scope: "row" }, known.link, make("small"), make("small", { class: "handle" }, line.handle));
+      known.ids = make("small");
+      known.head = make("th", { role: "rowheader", scope: "row" }, known.link, " ", known.ids);
       this.rows.set(line.handle, known);
     }
-    known.line = line;
+    Object.assign(known, { line, said: robot.said, stale: robot.stale() });
+    const headline = robot.headline();
     setText(known.link, title(line));
-    setText(known.head.children[1], kind(line));
-    known.head.children[2].hidden = title(line) === line.handle;
+    setText(known.ids, ids(line));
+    known.head.title = `${title(line)} · ${kind(line)} · ${line.handle}`;
     const focused = document.activeElement === known.link;
-    known.row.replaceChildren(known.head, ...FIELDS.map((field) => this.cell(field, line)), this.why(line), this.link(line, known.age));
+    const state = make("td", { role: "cell", class: "state" }, chip(headline));
+    known.row.replaceChildren(state, known.head, why(headline), ...FIELDS.map((field) => cell(field, robot)), linked(robot, known.age));
     if (focused) known.link.focus({ preventScroll: true });
-    known.row.className = line.in_error === true ? "in-error" : "";
+    known.row.className = headline.tone;
     return known.row;
   }
+}
 
-  cell(field, line) {
-    const look = looks(field, line[field.name]);
-    const cell = make("td", { role: "cell", "data-head": field.head }, chip(look));
-    if (field.name === "mode") cell.append(make("small", {}, isolated(line.vehicle?.flight_mode ?? "")));
-    if (field.name === "in_error" && line.in_error === true) cell.append(make("small", {}, String(line.error_code)));
+function cell(field, robot) {
+  const look = looks(field, robot.value(field.name));
+  const shown = make("td", { role: "cell", class: "field", "data-head": field.head }, chip({ ...look, word: look.short }));
+  const mode = field.name === "mode" ? robot.line.vehicle?.flight_mode : null;
+  const code = field.name === "in_error" && robot.value("in_error") === true ? ` ${robot.line.error_code}` : "";
+  shown.title = `${field.title}: ${look.word}${code}${mode ? ` (${mode})` : ""}`;
+  return shown;
+}
+
+function why(headline) {
+  const words = headline.sentences.map(plain).join(" ");
+  return make("td", { role: "cell", class: "why-cell", "data-head": "Why", title: words }, make("span", {}, ...told(headline.sentences)));
+}
+
+function linked(robot, age) {
+  const look = looks(LINK, robot.stale() ? undefined : robot.line.link?.state);
+  return make("td", { role: "cell", class: "link", "data-head": LINK.head }, chip({ ...look, word: look.short }), " ", age);
+}
+
+/** All robots: filters with their counts, search, sorting. */
+export class Fleet extends Rows {
+  constructor() {
+    super("head", "rows");
+    this.column = COLUMNS[0];
+    this.down = false;
+    this.filter = FILTERS[0];
+    this.order = [];
+    this.pointed = -Infinity;
+    this.body.addEventListener("pointermove", () => (this.pointed = performance.now() / 1000));
+    this.buttons = FILTERS.map((filter) => this.button(filter));
+    document.getElementById("filters").append(...this.buttons);
+    this.search = document.getElementById("search");
+    this.search.addEventListener("input", () => this.again());
+    this.mark();
+  }
+
+  button(filter) {
+    const button = make("button", { type: "button", class: `plain ${filter.tone}` }, make("b"), ` ${filter.name}`);
+    button.addEventListener("click", () => {
+      this.filter = this.filter === filter ? FILTERS[0] : filter;
+      this.again();
+    });
+    return button;
+  }
+
+  header(column) {
+    const cell = super.header(column);
+    if (!column.of) return cell;
+    const button = make("button", { type: "button", class: "plain" }, column.head);
+    button.addEventListener("click", () => {
+      this.down = this.column === column && !this.down;
+      this.column = column;
+      this.mark();
+      this.again();
+    });
+    cell.replaceChildren(button);
+    cell.column = column;
     return cell;
   }
 
-  why(line) {
-    const items = causes(line).map(([item]) => item);
-    return make("td", { role: "cell", class: "causes", "data-head": "Why" }, items.length ? make("ul", {}, ...items) : "");
+  mark() {
+    for (const cell of this.head.children) {
+      if (cell.column === this.column) cell.setAttribute("aria-sort", this.down ? "descending" : "ascending");
+      else cell.removeAttribute("aria-sort");
+    }
   }
 
-  link(line, age) {
-    return make("td", { role: "cell", class: "link", "data-head": LINK.head }, chip(looks(LINK, line.link?.state)), age);
+  /** Show the same robots again, after a person asked for another order or choice. */
+  again() {
+    this.pointed = -Infinity;
+    this.showAll(this.robots ?? []);
   }
+
+  showAll(robots) {
+    this.robots = robots;
+    const held = performance.now() / 1000 - this.pointed < HELD;
+    const order = sorted(robots, this.column, this.down);
+    if (held) order.sort((a, b) => at(this.order, a) - at(this.order, b));
+    this.order = order.map(({ line }) => line.handle);
+    const text = this.search.value.trim().toLowerCase();
+    const found = order.filter((robot) => this.filter.has(robot) && (text === "" || words(robot).includes(text)));
+    this.show(found);
+    this.count(robots);
+    document.getElementById("empty").hidden = robots.length > 0;
+    document.getElementById("none").hidden = robots.length === 0 || found.length > 0;
+    this.wall(found.length);
+  }
+
+  count(robots) {
+    // a group whose members have rows is not counted again
+    const there = new Set(robots.map(({ line }) => line.handle));
+    const single = robots.filter(({ line }) => !members(line).some((handle) => there.has(handle)));
+    FILTERS.forEach((filter, n) => {
+      const count = single.filter(filter.has).length;
+      setText(this.buttons[n].firstChild, `${count}`);
+      this.buttons[n].setAttribute("aria-pressed", `${filter === this.filter}`);
+      this.buttons[n].classList.toggle("some", count > 0);
+    });
+    this.errors = single.filter(FILTERS[1].has).length;
+  }
+
+  /** On a wide screen, robots that do not fit below each other stand in columns. */
+  wall(rows) {
+    const fit = Math.max(Math.floor((innerHeight - this.body.getBoundingClientRect().top - scrollY) / 32), 10);
+    const columns = innerWidth < 1600 ? 1 : Math.min(Math.ceil(rows / fit), Math.floor(innerWidth / 620));
+    document.body.classList.toggle("wall", columns > 1);
+    document.body.style.setProperty("--columns", columns);
+  }
+}
+
+/** Where a robot was; a new one is last. */
+function at(order, robot) {
+  const found = order.indexOf(robot.line.handle);
+  return found < 0 ? order.length : found;
+}
+
+/** What a search looks at. */
+function words(robot) {
+  const headline = robot.headline();
+  return [title(robot.line), robot.line.handle, kind(robot.line), headline.word, ...headline.sentences.map(plain)].join(" ").toLowerCase();
 }

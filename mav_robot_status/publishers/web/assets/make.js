@@ -1,5 +1,7 @@
 // Creates elements. Text from a vehicle becomes a text node, never markup.
 
+import { clock } from "./words.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 
 /** An element with attributes and children; strings become text. */
@@ -25,6 +27,16 @@ export function shape(name) {
 /** Shape and word of a value. */
 export function chip({ shape: name, word, tone }) {
   return make("span", { class: `chip ${tone}` }, shape(name), make("span", {}, word));
+}
+
+/** Sentences of the gateway. The words of the autopilot are quoted, and nothing in them affects other text. */
+export function told(sentences) {
+  return sentences.flatMap(({ text, at, quote }, n) => {
+    const parts = [n ? " " : "", isolated(text)];
+    if (at) parts.push(" ", make("time", { datetime: at }, clock(at)));
+    if (quote) parts.push(" “", isolated(quote), "”");
+    return [...parts, /[.:]$/.test(text) ? "" : "."];
+  });
 }
 
 /** Set the text if it differs. This keeps a selection, and screen readers repeat nothing. */

@@ -1,42 +1,22 @@
-// The page: it holds the data of the gateway, and shows the fleet or one vehicle.
+// The page: it holds the data of the gateway, and shows the fleet or one robot.
 
+import { Alarms } from "./alarm.js";
 import { Fleet } from "./fleet.js";
+import { Robot } from "./robot.js";
 import { Stream } from "./stream.js";
 import { VehiclePage } from "./vehicle.js";
 import { chip, setText } from "./make.js";
-import { clock, span } from "./words.js";
+import { clock, LINK, looks, span } from "./words.js";
 
 const TOKEN = "mav-robot-status token";
+const LIST = "?all"; // the place of the list, also of a single robot
 const at = (id) => document.getElementById(id);
 const seconds = () => performance.now() / 1000;
 
-/** The latest status of one handle, and its time of arrival. */
-class Vehicle {
-  constructor(line) {
-    this.setLine(line);
-  }
-
-  setLine(line) {
-    this.line = line;
-    this.heartbeat(line.stamp, line.link?.heartbeat_age ?? null, 0);
-  }
-
-  heartbeat(stamp, heartbeatAge, age) {
-    Object.assign(this, { stamp, heartbeatAge, age, at: seconds() });
-  }
-
-  currentAge() {
-    return this.heartbeatAge === null ? null : this.heartbeatAge + this.age + seconds() - this.at;
-  }
-
-  stale() {
-    return page.staleAfter !== null && this.age + seconds() - this.at > page.staleAfter;
-  }
-}
-
-const page = { vehicles: new Map(), state: "connecting", receivedAt: null, receivedStamp: null, standing: null, staleAfter: null };
+const page = { robots: new Map(), state: "connecting", receivedAt: null, receivedStamp: null, standing: null, staleAfter: null, wanted: null, list: false };
 const fleet = new Fleet();
 const one = new VehiclePage();
+const alarms = new Alarms();
 let stream = null;
 
 const on = {
@@ -46,19 +26,21 @@ const on = {
     if (name === "explanation") return data.handle === one.handle && one.explain(data);
     [page.state, page.receivedAt, page.receivedStamp, page.standing] = ["live", now, data.now, data.standing];
     if (name === "board") {
-      page.vehicles.clear();
+      page.robots.clear();
       page.staleAfter = data.stale_after;
       setText(at("source"), `${data.source}`);
       at("source").title = `mav-robot-status ${data.version}`;
+      alarms.enable(data.alarm === true);
     }
     for (const line of data.vehicles) {
-      const known = page.vehicles.get(line.handle);
-      if (known) known.setLine(line);
-      else page.vehicles.set(line.handle, new Vehicle(line));
+      const known = page.robots.get(line.handle);
+      if (known) known.set(line, data.headlines?.[line.handle]);
+      else page.robots.set(line.handle, new Robot(line, data.headlines?.[line.handle]));
     }
-    for (const [handle, beat] of Object.entries(data.beats ?? {})) page.vehicles.get(handle)?.heartbeat(...beat);
-    // `beats` names every vehicle that the gateway has
-    if (data.beats) for (const handle of [...page.vehicles.keys()]) if (!(handle in data.beats)) page.vehicles.delete(handle);
+    for (const [handle, beat] of Object.entries(data.beats ?? {})) page.robots.get(handle)?.heartbeat(...beat);
+    // `beats` names every robot that the gateway has
+    if (data.beats) for (const handle of [...page.robots.keys()]) if (!(handle in data.beats)) page.robots.delete(handle);
+    turn();
     return render();
   },
   lost() {
@@ -75,41 +57,66 @@ const on = {
   },
 };
 
-function ordered() {
-  const key = ({ line }) => [line.system ?? Infinity, line.component ?? 0];
-  return [...page.vehicles.values()].sort((a, b) => {
-    const [x, y] = [key(a), key(b)];
-    return x[0] - y[0] || x[1] - y[1] || (a.line.handle < b.line.handle ? -1 : 1);
-  });
+/** The robot to show: the chosen one, or the only one; null is the list. */
+function wanted() {
+  if (page.wanted !== null || page.list || page.robots.size !== 1) return page.wanted;
+  return page.robots.keys().next().value;
+}
+
+/** Turn to the robot to show. */
+function turn() {
+  if (wanted() === one.handle) return;
+  one.open(wanted());
+  connect();
 }
 
 function render() {
   const denied = page.state === "denied";
-  const vehicle = page.vehicles.get(one.handle);
+  const robot = page.robots.get(one.handle);
   at("token").hidden = !denied;
   at("fleet").hidden = denied || one.handle !== null || page.receivedAt === null;
   at("vehicle").hidden = denied || one.handle === null || page.receivedAt === null;
-  if (one.handle === null) fleet.show(ordered());
-  else if (vehicle) one.show(vehicle);
-  else setText(at("who"), "The gateway has no such vehicle.");
+  freeze();
+  if (one.handle === null) fleet.showAll([...page.robots.values()]);
+  else if (robot) one.show(robot, page.robots);
+  else setText(at("who"), "The gateway has no such robot.");
   age();
 }
 
+/** While nothing arrives of the gateway, every robot is unknown. */
+function freeze() {
+  const frozen = page.state === "lost" || page.standing !== null ? page.receivedStamp : null;
+  for (const robot of page.robots.values()) Object.assign(robot, { frozen, staleAfter: page.staleAfter });
+}
+
 function age() {
+  freeze();
   const live = page.state === "live" && page.standing === null;
   document.body.classList.toggle("stale", page.state === "lost" || page.standing !== null);
-  const looks = {
+  const states = {
     live: { shape: "bars", word: "live", tone: "calm" },
     connecting: { shape: "ring", word: "connecting …", tone: "unknown" },
-    lost: { shape: "lost", word: "NOT CONNECTED", tone: "danger" },
-    denied: { shape: "bar", word: "token needed", tone: "caution" },
+    lost: { ...looks(LINK, "LOST"), word: "NOT CONNECTED" },
+    denied: { shape: "bar", word: "token needed", tone: "warning" },
   };
-  const look = page.standing !== null && page.state === "live" ? { ...looks.lost, word: "STALLED" } : looks[page.state];
+  const look = page.standing !== null && page.state === "live" ? { ...states.lost, word: "STALLED" } : states[page.state];
   if (at("connection").textContent !== look.word) at("connection").replaceChildren(chip(look));
-  const vehicle = page.vehicles.get(one.handle);
-  if (one.handle === null) fleet.age(page.vehicles.values());
-  else if (vehicle) one.age(vehicle, live, seconds());
+  const robot = page.robots.get(one.handle);
+  if (one.handle === null) fleet.age(page.robots.values());
+  else if (robot) one.age(robot, live, seconds());
   warn();
+  alarms.take([...page.robots.values()], at("banner").hidden ? null : "nothing arrives from the gateway");
+  mark();
+}
+
+/** The marks of new alarms, and the title of the window. */
+function mark() {
+  const marked = alarms.marked();
+  for (const [handle, { row }] of fleet.rows) row.classList.toggle("new", marked.has(handle));
+  const robot = page.robots.get(one.handle);
+  const words = robot ? one.title(robot) : fleet.errors ? `(${fleet.errors}!) RobotStatus` : "RobotStatus";
+  const title = marked.size ? `\u25b2 NEW ${words}` : words;
+  if (document.title !== title) document.title = title;
 }
 
 function warn() {
@@ -117,8 +124,8 @@ function warn() {
   const lost = page.state === "lost";
   banner.hidden = !(lost || page.standing !== null) || page.state === "denied";
   if (banner.hidden) return;
-  const since = page.receivedAt === null ? "" : ` since ${clock(page.receivedStamp)}, ${span(seconds() - page.receivedAt)} ago. The data shown is from then`;
-  setText(banner, lost ? `No connection to the gateway${since}. Trying again.` : `The gateway has been stalled for ${span(page.standing)}. The data shown may be old.`);
+  const since = page.receivedAt === null ? "" : ` since ${clock(page.receivedStamp)}, ${span(seconds() - page.receivedAt)} ago`;
+  setText(banner, lost ? `No connection to the gateway${since}. Trying again.` : `The gateway has been stalled for ${span(page.standing)}. What it last said may be old.`);
 }
 
 function route() {
@@ -133,13 +140,15 @@ function route() {
     history.replaceState(null, "", "#/");
     handle = null;
   }
+  page.list = location.hash === `#${LIST}`;
+  page.wanted = page.list ? null : handle;
   const moved = stream !== null;
-  one.open(handle);
+  one.open(wanted());
   connect();
   render();
   if (moved) {
     scrollTo(0, 0);
-    at(handle === null ? "fleet-title" : "vehicle-title").focus({ preventScroll: true });
+    at(one.handle === null ? "fleet-title" : "vehicle-title").focus({ preventScroll: true });
   }
 }
 
@@ -156,5 +165,9 @@ at("token").addEventListener("submit", (event) => {
   render();
 });
 addEventListener("hashchange", route);
+addEventListener("resize", () => one.handle === null && fleet.again());
+// a page that the browser keeps for its back button must not keep a connection
+addEventListener("pagehide", () => stream.close());
+addEventListener("pageshow", (event) => event.persisted && connect());
 setInterval(age, 500);
 route();

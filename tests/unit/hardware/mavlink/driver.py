@@ -25,7 +25,7 @@ from mav_robot_status.testing import ManualClock
 from .settled import outdated
 
 ARDUPILOT, PX4 = 3, 12
-PLANE, QUAD, ROVER, SUB = 1, 2, 10, 12
+PLANE, QUAD, ROVER, SUB, QUADPLANE = 1, 2, 10, 12, 20
 STANDBY, ACTIVE, CRITICAL, EMERGENCY, TERMINATED = 3, 4, 5, 6, 8
 
 GYRO, GPS, MOTORS, RC, FENCE, AHRS, BATTERY, PREARM = (1 << bit for bit in (0, 5, 15, 16, 20, 21, 25, 28))
@@ -114,6 +114,8 @@ class Flight:
         self.internal_errors = 0
         self.booted_us = -60_000_000
         self.asks: list[Any] = []
+        self.passive: tuple[Ids, ...] = ()
+        """Vehicles on passive links."""
         self._us = 0
         self._start = self.clock.now().mono
         self._sequence = 0
@@ -220,7 +222,7 @@ class Flight:
                 self.hw.take(frame_of(stream.message(), stream.ids), now)
                 stream.next_us = self._us + stream.period_us
         self.hw.read(now)
-        self.asks += [ask.message for ask in self.hw.due_requests(now)]
+        self.asks += [ask.message for ask in self.hw.due_requests(now, self.passive)]
         for tracked in self.hw.vehicles:
             check_invariants(tracked.handle.status, tracked.handle.detail, self.hw.options)
             check_present(tracked, now, self.hw.options)

@@ -8,6 +8,7 @@ from struct import pack
 from typing import Any, Final
 
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
+from mav_robot_status.hardware.mavlink.px4_events import ARMING_SUMMARY, HEALTH_SUMMARY
 from mav_robot_status.mavlink import definitions as mav
 
 from .driver import (
@@ -57,6 +58,8 @@ TEXTS: Final = (
     "Fence Breached",
     "PreArm: Motors Emergency Stopped",
     "PreArm: Compass not healthy",
+    "PreArm: GPS 1: Bad fix",
+    "Arm: Compass not healthy",
     "RC7: MotorEStop HIGH",
     "RC7: MotorEStop LOW",
     "Terminating due to GCS request",
@@ -68,6 +71,7 @@ TEXTS: Final = (
     "Emergency stop activated",
     "Kill engaged",
 )
+EVENTS: Final = (1, ARMING_SUMMARY, HEALTH_SUMMARY, HEALTH_SUMMARY)
 PARAMETERS: Final = (b"SERVO1_FUNCTION", b"SERVO3_FUNCTION", b"SERVO5_FUNCTION", b"RC7_OPTION")
 COMMANDS: Final = ((185, 1.0, 0.0), (218, 31.0, 2.0), (218, 31.0, 0.0))
 
@@ -86,8 +90,10 @@ MESSAGES: Final[dict[type, Make]] = {
         dice.choice(TEXTS), dice.randrange(8), dice.choice((0, 0, 0, 1)), dice.choice((0, 1))
     ),
     mav.Event: lambda flight, dice: mav.Event(
-        1, flight.boot_ms, dice.randrange(99), 0, 0, dice.choice((0x42, 0x62, 0x88)), b""
+        dice.choice(EVENTS), flight.boot_ms, dice.randrange(99), 0, 0, dice.choice((0x42, 0x62, 0x88)), bytes(40)
     ),
+    mav.CurrentEventSequence: lambda _, dice: mav.CurrentEventSequence(dice.randrange(99), dice.choice((0, 0, 1))),
+    mav.ResponseEventError: lambda _, dice: mav.ResponseEventError(dice.randrange(99), dice.randrange(99), 0, 0, 0),
     mav.ExtendedSysState: lambda _, dice: mav.ExtendedSysState(dice.choice((0, 0, 3)), dice.randrange(5)),
     mav.GlobalPositionInt: lambda flight, dice: mav.GlobalPositionInt(
         flight.boot_ms, dice.choice((0, 1)), 0, round(100 * dice.choice(SPEEDS)), 0, 0
@@ -107,6 +113,13 @@ MESSAGES: Final[dict[type, Make]] = {
     mav.EscTelemetry5To8: _rpm("H", lambda rpm: mav.EscTelemetry5To8(b"", b"", b"", rpm, b"", b"")),
     mav.EscTelemetry9To12: _rpm("H", lambda rpm: mav.EscTelemetry9To12(b"", b"", b"", rpm, b"", b"")),
     mav.EscStatus: _rpm("i", lambda rpm: mav.EscStatus(0, rpm, b"", b"", 0)),
+    mav.BatteryStatus: lambda _, dice: mav.BatteryStatus(
+        dice.choice((0, 0, 1)), dice.choice((0, 1, 3, 6)), dice.choice((0, 0, 16))
+    ),
+    mav.EscInfo: lambda _, dice: mav.EscInfo(
+        pack("<4H", *[dice.choice((0, 0, 32)) for _ in range(4)]), dice.choice((0, 4)), 8, 15
+    ),
+    mav.OpenDroneIdArmStatus: lambda _, dice: mav.OpenDroneIdArmStatus(dice.choice((0, 1)), b"no fix"),
     mav.CommandLong: lambda _, dice: _command(*dice.choice(COMMANDS)),
     mav.CommandAck: lambda _, dice: mav.CommandAck(dice.choice((185, 218)), dice.choice((0, 0, 4)), 0, 0, 0, 0),
     mav.NamedValueFloat: lambda flight, dice: mav.NamedValueFloat(flight.boot_ms, dice.randrange(4), b"RS_STOP"),

@@ -7,6 +7,7 @@ each fact that has changed, or that time changes earlier, without an `unsettled`
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -14,8 +15,8 @@ import pytest
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.hardware.mavlink import interface
-from mav_robot_status.hardware.mavlink.handlers import heartbeat
-from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.handlers import Handler, heartbeat
+from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW, Stamped
 from mav_robot_status.hardware.mavlink.message_table import KINDS, MOVES
 from mav_robot_status.hardware.mavlink.moment import Moment
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
@@ -54,6 +55,10 @@ class Witness(MavlinkRobotHW):
 
     changes: ClassVar[Changes] = set()
 
+    def take_all(self, records: Iterator[Stamped], last: Instant, until: float) -> tuple[Instant, Stamped | None]:
+        """Take none of the records of a log, so that each passes `take`."""
+        return last, next(records, None)
+
     def take(self, frame: Any, now: Instant, way: Any = None) -> TrackedVehicle | None:
         """Take one frame, and note the facts that it changes."""
         sender = super().take(frame, now, way)
@@ -70,6 +75,29 @@ def ignore_table(monkeypatch: pytest.MonkeyPatch) -> Changes:
     """Let no message settle a fact by `MOVES`. Returns what a `Witness` notes from now on."""
     monkeypatch.setattr(interface, "KINDS", {number: (handler, ()) for number, (handler, _) in KINDS.items()})
     changes: Changes = set()
+    monkeypatch.setattr(Witness, "changes", changes)
+    return changes
+
+
+def note_claims(monkeypatch: pytest.MonkeyPatch) -> Changes:
+    """Let a `Witness` note only what a message changes whose handler says that it has changed nothing."""
+    said_unchanged = False
+
+    def noting(handler: Handler) -> Handler:
+        def handle(*values: Any) -> bool | None:
+            nonlocal said_unchanged
+            said_unchanged = bool(handler(*values))
+            return said_unchanged
+
+        return handle
+
+    class Claimed(set[tuple[type, str]]):
+        def update(self, *found: Any) -> None:
+            if said_unchanged:
+                super().update(*found)
+
+    monkeypatch.setattr(interface, "KINDS", {number: (noting(handler), ()) for number, (handler, _) in KINDS.items()})
+    changes = Claimed()
     monkeypatch.setattr(Witness, "changes", changes)
     return changes
 

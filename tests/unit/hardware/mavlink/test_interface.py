@@ -2,13 +2,15 @@ from __future__ import annotations
 
 import logging
 import math
+from itertools import permutations
 
 import pytest
 
-from mav_robot_status.hardware.mavlink.interface import ESTABLISHED, MOST_PASSING, MOST_VEHICLES, MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.vehicle import ExpectedVehicle
-from mav_robot_status.interface import LinkState, RobotStatus, TriState
+from mav_robot_status.hardware.mavlink.places import MOST_PASSING, MOST_VEHICLES
+from mav_robot_status.hardware.mavlink.vehicle import ESTABLISHED, ExpectedVehicle
+from mav_robot_status.interface import LinkState, RobotStatus, TriState, Vehicle
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.framing import Parser
@@ -31,7 +33,25 @@ def test_every_autopilot_gets_a_handle_without_configuration() -> None:
     hw = MavlinkRobotHW()
     assert hw.handles.get_names() == []
     hear(hw, (7, 1), (8, 5))
-    assert hw.handles.get_names() == [NAME, f"{NAME}/8.5"]
+    assert hw.handles.get_names() == [f"{NAME}/7.1", f"{NAME}/8.5"]
+
+
+@pytest.mark.parametrize("order", list(permutations([(1, 1), (7, 1), (1, 2)])))
+def test_the_name_of_a_handle_does_not_depend_on_who_is_heard_first(order: tuple[tuple[int, int], ...]) -> None:
+    hw = MavlinkRobotHW()
+    hear(hw, *order)
+    names = {vehicle.ids: vehicle.handle.name for vehicle in hw.vehicles}
+    assert names == {(1, 1): NAME, (7, 1): f"{NAME}/7.1", (1, 2): f"{NAME}/1.2"}
+
+
+def test_vehicle_1_1_has_the_plain_handle_again_after_its_place_was_taken_away() -> None:
+    hw, clock = MavlinkRobotHW(), ManualClock()
+    beats(hw, clock, 3, *((1 + n, 1) for n in range(MOST_PASSING + 1)))
+    hw.read(clock.advance(5))
+    hw.read(clock.advance(10))
+    assert hw.handles.get_names() == []
+    beats(hw, clock, 1, (9, 1), (1, 1))
+    assert hw.handles.get_names() == [f"{NAME}/9.1", NAME]
 
 
 def test_configured_vehicles_have_their_handles_from_the_start_and_others_are_counted() -> None:
@@ -49,6 +69,37 @@ def test_an_exact_vehicle_entry_takes_precedence_over_a_general_one() -> None:
     hear(hw, (5, 1), (6, 1))
     assert hw.handles.get_handle("five").detail.system == 5
     assert hw.handles.get_handle("any").detail.system == 6
+
+
+def test_a_name_is_in_the_detail_before_during_and_after_the_link() -> None:
+    hw = MavlinkRobotHW(slots=[ExpectedVehicle(1, None, "rover", "Rover-A")])
+    handle, clock = hw.handles.get_handle("rover"), ManualClock()
+    assert handle.detail.vehicle == Vehicle(name="Rover-A")
+    beats(hw, clock, 6, (1, 1))
+    assert (handle.detail.vehicle.name, handle.detail.vehicle.type) == ("Rover-A", "QUADROTOR")
+    hw.read(clock.advance(10))
+    assert (handle.detail.vehicle.name, handle.detail.link) == ("Rover-A", LinkState.LOST)
+    hw.forget()
+    assert handle.detail.vehicle == Vehicle(name="Rover-A")
+
+
+def test_the_name_of_exact_ids_goes_before_that_of_a_system() -> None:
+    hw = MavlinkRobotHW(names={(1, None): "Rover", (1, 2): "Arm", (5, 1): "Boat"})
+    hear(hw, (1, 1), (1, 2), (2, 1), (5, 1))
+    assert [handle.detail.vehicle.name for handle in hw.handles] == ["Rover", "Arm", None, "Boat"]
+
+
+def test_a_name_of_the_command_line_goes_before_that_of_the_file() -> None:
+    hw = MavlinkRobotHW(slots=[ExpectedVehicle(1, None, "rover", "old")], names={(1, None): "new"})
+    assert hw.handles.get_handle("rover").detail.vehicle.name == "new"
+
+
+def test_a_vehicle_taken_over_has_the_name_of_the_new_configuration() -> None:
+    hw, heir = MavlinkRobotHW(names={(7, None): "old"}), MavlinkRobotHW(names={(7, None): "new"})
+    hear(hw, (7, 1))
+    heir.adopt(hw)
+    heir.read(ManualClock().now())
+    assert [handle.detail.vehicle.name for handle in heir.handles] == ["new"]
 
 
 def test_a_handle_stays_with_its_vehicle() -> None:
@@ -207,14 +258,14 @@ def test_a_vehicle_heard_briefly_stays_as_lost() -> None:
     clock.advance(1000)
     hw.read(clock.now())
     hw.read(clock.now())
-    assert hw.handles.get_handle(NAME).detail.link is LinkState.LOST
+    assert hw.handles.get_handle(f"{NAME}/7.1").detail.link is LinkState.LOST
     assert hw.next_due() == math.inf
 
 
 def test_many_vehicles_heard_briefly_give_up_their_places_and_their_handles() -> None:
     hw, clock = MavlinkRobotHW(), ManualClock()
     beats(hw, clock, 3, *((7 + n, 1) for n in range(MOST_PASSING + 1)))
-    handle = hw.handles.get_handle(NAME)
+    handle = hw.handles.get_handle(f"{NAME}/7.1")
     clock.advance(5)
     hw.read(clock.now())
     assert handle.detail.link is LinkState.LOST
@@ -225,7 +276,7 @@ def test_many_vehicles_heard_briefly_give_up_their_places_and_their_handles() ->
     assert (handle.status, handle.detail.link) == (RobotStatus(), LinkState.NEVER_SEEN)
     assert hw.next_due() == math.inf
     beats(hw, clock, 1, (8, 1))
-    assert hw.handles.get_names() == [NAME]
+    assert hw.handles.get_names() == [f"{NAME}/8.1"]
 
 
 def test_a_vehicle_that_was_there_stays_as_lost() -> None:
@@ -233,7 +284,7 @@ def test_a_vehicle_that_was_there_stays_as_lost() -> None:
     beats(hw, clock, ESTABLISHED + 2, (7, 1))
     clock.advance(1000)
     hw.read(clock.now())
-    assert hw.handles.get_handle(NAME).detail.link is LinkState.LOST
+    assert hw.handles.get_handle(f"{NAME}/7.1").detail.link is LinkState.LOST
 
 
 def test_a_new_vehicle_gets_the_place_of_the_one_that_is_silent_longest() -> None:

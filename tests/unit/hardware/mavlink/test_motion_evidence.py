@@ -7,23 +7,46 @@ import pytest
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink import definitions as mav
 
-from .driver import ACTIVE, AHRS, ARDUPILOT, PLANE, PREARM, QUAD, ROVER, STANDBY, SUB, Flight, copter, rover
+from .driver import (
+    ACTIVE,
+    AHRS,
+    ARDUPILOT,
+    PLANE,
+    PREARM,
+    PX4,
+    QUAD,
+    QUADPLANE,
+    ROVER,
+    STANDBY,
+    SUB,
+    Flight,
+    copter,
+    rover,
+)
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 IN_AIR, ON_GROUND = 2, 1
+HELICOPTER, MULTICOPTER = 4, 3
 HEALTHY, NO_ATTITUDE = 0x33F, 0x400
 
 
 class Air:
     """A vehicle that reports to be in the air: its speed, rotation and throttle."""
 
-    def __init__(self, vehicle_type: int, throttle: int, landed_state: int = IN_AIR) -> None:
+    def __init__(
+        self,
+        vehicle_type: int,
+        throttle: int,
+        landed_state: int = IN_AIR,
+        vtol_state: int = 0,
+        autopilot: int = ARDUPILOT,
+    ) -> None:
         self.speed, self.rate, self.throttle, self.landed_state = 0, 0.0, throttle, landed_state
-        self.flight = flight = Flight(ARDUPILOT, vehicle_type)
+        self.flight = flight = Flight(autopilot, vehicle_type)
         flight.stream("position", lambda: mav.GlobalPositionInt(flight.boot_ms, 1, 1, self.speed, 0, 0), hz=4)
         flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0, 0, self.rate), hz=4)
         flight.stream("hud", lambda: mav.VfrHud(self.speed / 100, 0.0, self.throttle), hz=2)
-        flight.stream("landed", lambda: mav.ExtendedSysState(0, self.landed_state), hz=2)
+        flight.stream("landed", lambda: mav.ExtendedSysState(vtol_state, self.landed_state), hz=2)
         flight.wait(15)
         flight.hb(armed=True, state=ACTIVE).wait(5)
 
@@ -33,9 +56,45 @@ class Air:
         return self.flight.status.in_motion
 
 
-@pytest.mark.parametrize("vehicle_type", [PLANE, QUAD, 20])
-def test_in_the_air_but_still_and_without_throttle_is_unknown(vehicle_type: int) -> None:
-    assert Air(vehicle_type, throttle=0).in_motion is UNKNOWN
+@pytest.mark.parametrize(("vehicle_type", "throttle"), [(PLANE, 0), (HELICOPTER, 0), (QUADPLANE, 0), (QUAD, 5)])
+def test_in_the_air_but_still_and_hardly_with_throttle_is_unknown(vehicle_type: int, throttle: int) -> None:
+    assert Air(vehicle_type, throttle).in_motion is UNKNOWN
+
+
+@pytest.mark.parametrize(("vehicle_type", "vtol_state"), [(QUAD, 0), (QUADPLANE, MULTICOPTER)])
+def test_a_multicopter_that_stands_still_without_thrust_lies_on_the_ground(vehicle_type: int, vtol_state: int) -> None:
+    air = Air(vehicle_type, throttle=0, vtol_state=vtol_state)
+    assert air.in_motion is FALSE
+    air.throttle = 55
+    assert air.in_motion is FALSE, "it has not moved since"
+    air.speed = 100
+    assert air.in_motion is TRUE
+    air.speed = 0
+    assert air.in_motion is TRUE, "this may be a hover"
+
+
+def test_thrust_of_another_autopilot_than_ardupilot_is_not_known() -> None:
+    air = Air(QUAD, throttle=0, autopilot=PX4)
+    assert air.in_motion is UNKNOWN
+    air.throttle = 55
+    assert air.in_motion is TRUE
+
+
+def test_what_moved_unseen_may_hover() -> None:
+    air = Air(QUAD, throttle=0)
+    assert air.in_motion is FALSE
+    air.flight.stop("position", "hud").wait(4)
+    air.throttle = 55
+    air.flight.stream("position", lambda: mav.GlobalPositionInt(air.flight.boot_ms, 1, 1, air.speed, 0, 0), hz=4)
+    assert air.in_motion is TRUE
+
+
+def test_an_aircraft_that_drops_is_in_motion() -> None:
+    air = Air(QUAD, throttle=0)
+    air.speed = 16  # slow, at the top of its path
+    assert air.in_motion is UNKNOWN
+    air.speed = 500
+    assert air.in_motion is TRUE
 
 
 def test_a_still_hover_is_in_motion() -> None:
@@ -56,7 +115,7 @@ def test_a_tumble_without_throttle_is_in_motion() -> None:
 
 
 def test_in_the_air_without_a_fresh_throttle_is_in_motion() -> None:
-    air = Air(QUAD, throttle=0)
+    air = Air(PLANE, throttle=0)
     air.flight.stop("hud")
     assert air.in_motion is TRUE
 
@@ -155,3 +214,24 @@ def test_zeros_of_a_known_autopilot_show_rest() -> None:
     flight = rover()
     flight.stream("hud", lambda: mav.VfrHud(0.0, 0.0, 0), hz=4).wait(20)
     assert flight.status.in_motion is FALSE
+
+
+def settling(speed: int, receiver: int, armed: bool = False) -> Flight:
+    """A rover whose estimate of `speed` cm/s decides nothing, beside a GPS receiver that reads `receiver` cm/s."""
+    flight = rover()
+    flight.set(health=flight.health | AHRS)
+    flight.wait(15)
+    flight.stream("position", lambda: mav.GlobalPositionInt(flight.boot_ms, 1, 1, speed, 0, 0), hz=4)
+    flight.stream("receiver", lambda: mav.GpsRawInt(receiver, 6), hz=4)
+    flight.hb(armed=armed, state=ACTIVE if armed else STANDBY).wait(5)
+    return flight
+
+
+def test_a_receiver_that_stands_still_decides_for_a_disarmed_vehicle_whose_estimate_does_not() -> None:
+    assert settling(45, receiver=1).status.in_motion is FALSE
+    assert settling(45, receiver=45).status.in_motion is UNKNOWN
+    assert settling(25, receiver=1, armed=True).status.in_motion is UNKNOWN
+
+
+def test_a_receiver_that_stands_still_leaves_an_estimate_that_moves_in_doubt() -> None:
+    assert settling(60, receiver=1).status.in_motion is UNKNOWN

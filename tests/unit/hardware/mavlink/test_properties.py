@@ -44,7 +44,7 @@ from .driver import (
 )
 from .driver import statustext as text_message
 
-QUICK = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+QUICK = settings(max_examples=75, deadline=None, suppress_health_check=list(HealthCheck))
 
 INTEGERS = {"B": (0, 8), "b": (-8, 8), "H": (0, 16), "h": (-16, 16), "I": (0, 32), "i": (-32, 32), "Q": (0, 64)}
 
@@ -64,6 +64,12 @@ TELLING = {
     "landed_state": [0, 1, 2, 3, 4],
     "time_boot_ms": [0, 100, 5000, 900_000, 2**32 - 1],
     "port": [0, 1],
+    "custom0": [1, 81, 209 - 256, -128],
+    "eph": [0],
+    "epv": [0],
+    "climb_rate": [0],
+    "custom1": [0],
+    "custom2": [0],
 }
 WORDS = [
     "Radio Failsafe",
@@ -96,7 +102,8 @@ def values(name: str, code: str, size: int) -> st.SearchStrategy[Any]:
     if code == "f":
         return st.one_of(st.floats(width=32), st.sampled_from([0.0, 0.05, 0.2, 1.0, 33.0]))
     some = integers(code)
-    return st.one_of(st.sampled_from(TELLING[name]), some) if name in TELLING else some
+    telling = [value for value in TELLING.get(name, []) if value < 1 << INTEGERS[code][1]]
+    return st.one_of(st.sampled_from(telling), some) if telling else some
 
 
 def messages_of(definition: mav.Definition) -> st.SearchStrategy[Any]:

@@ -94,6 +94,16 @@ def test_the_inhibit_gives_the_reason_why_a_robot_is_unknown() -> None:
     assert (subscriber.shown["r"]["system"], subscriber.shown["r"]["link"]["state"]) == (1, "LOST")
 
 
+def test_the_last_status_with_a_connected_link_is_kept_also_a_retained_one() -> None:
+    subscriber = Subscriber()
+    assert subscriber.fleet.last("r") is None
+    subscriber.status(5, 0.0, retained=True)
+    subscriber.receive("connection", "CONNECTIONBROKEN", 1.0)
+    last = subscriber.fleet.last("r")
+    assert last is not None
+    assert (last["mode"], last["seq"]) == ("AUTO", 5)
+
+
 def test_events_duplicates_and_missing_events_are_counted() -> None:
     subscriber = Subscriber()
     for session, seq in [("a", 4), ("a", 5), ("a", 5), ("a", 8), ("b", 1), ("b", 2)]:

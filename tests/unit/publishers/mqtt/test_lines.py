@@ -49,3 +49,10 @@ def test_a_robot_without_a_live_status_keeps_only_its_identity() -> None:
     assert (left["vehicle"]["flight_mode"], left["link"]["state"]) == (None, "LOST")
     assert left["inhibits"] == [{"name": "LINK_STALE", "text": "why", "since": "now"}]
     assert unknown({}, "now", None)["link"]["state"] == "NEVER_SEEN"
+
+
+def test_a_group_without_a_live_status_keeps_its_members() -> None:
+    group = MSG._replace(detail=MSG.detail._replace(members=("base", "arm")))
+    assert unknown(json.loads(line_of(group, 4)), "now", "why")["members"] == ["base", "arm"]
+    for other in ({}, {"members": 7}, json.loads(line_of(MSG, 4))):
+        assert "members" not in unknown(other, "now", "why")

@@ -14,7 +14,7 @@ import pytest
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import UsageError
-from mav_robot_status.interface import Detail, PublisherContext, RobotMode, RobotStatus, RobotStatusMsg
+from mav_robot_status.interface import Detail, LinkState, PublisherContext, RobotMode, RobotStatus, RobotStatusMsg
 from mav_robot_status.publishers.mqtt.journal import Journal
 from mav_robot_status.publishers.mqtt.publisher import MqttPublisher
 from mav_robot_status.publishers.mqtt.spool import Event
@@ -82,7 +82,9 @@ def test_a_second_robot_of_the_same_name_is_not_published(
 
 
 def test_a_robot_is_published_once_it_has_a_name(publish: Callable[..., list[dict[str, Any]]]) -> None:
-    assert [event["system"] for event in publish(msg(MANUAL, system=None), msg(MANUAL))] == [1]
+    unheard = msg(MANUAL, system=None)
+    unheard = unheard._replace(detail=unheard.detail._replace(link=LinkState.NEVER_SEEN))
+    assert [event["system"] for event in publish(unheard, msg(MANUAL))] == [1]
 
 
 def test_an_event_is_on_the_disk_when_publish_returns(spool: Path) -> None:

@@ -64,6 +64,34 @@ def test_a_new_listener_gets_the_whole_board_and_then_changes(stage: Stage) -> N
     assert (name, [line["handle"] for line in data["vehicles"]]) == ("change", ["b"])
 
 
+def test_each_line_comes_with_its_headline_and_none_is_made_while_nobody_listens(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def said(line: dict[str, Any], last: object) -> dict[str, Any]:
+        made.append(line["handle"])
+        return {"word": "CAN MOVE"}
+
+    monkeypatch.setattr(events, "said", said)
+    stage.take(MANUAL, "a")
+    stage.take(MANUAL, "b")
+    stage.events.pulse()
+    assert made == []
+    for _ in range(2):
+        [(_, data)] = stage.received(stage.listener())
+        assert data["headlines"] == {"a": {"word": "CAN MOVE"}, "b": {"word": "CAN MOVE"}}
+    assert made == ["a", "b"]  # once for all listeners
+
+
+def test_the_page_is_told_whether_to_give_alarms(stage: Stage) -> None:
+    assert stage.received(stage.listener())[0][1]["alarm"] is False
+    loud = Events(stage.board, stage.clock.now, lambda: None, alarm=True)
+    listener = Listener(None, lambda: None)
+    loud.enter(listener)
+    assert next(parsed(loud.since(listener)))[1]["alarm"] is True
+
+
 def test_a_slow_listener_misses_the_states_between(stage: Stage) -> None:
     listener = stage.listener()
     stage.received(listener)

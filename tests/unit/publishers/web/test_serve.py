@@ -14,7 +14,7 @@ from mav_robot_status.clock import now as present
 from mav_robot_status.interface import Detail, RobotMode, RobotStatus
 from mav_robot_status.publishers.board import Board
 from mav_robot_status.publishers.web import events
-from mav_robot_status.publishers.web.serve import STANDING, serve
+from mav_robot_status.publishers.web.serve import GENERATED, STANDING, serve
 from mav_robot_status.publishers.web.settings import WebSettings
 
 from ....deadline import in_time
@@ -52,6 +52,14 @@ def test_vehicles_are_native_lines() -> None:
             assert site.ask(f"/api/v1/vehicles/{which}").json["handle"] == handle
         missing = site.ask("/api/v1/vehicles/7")
         assert (missing.status, missing.json["error"]) == (404, "no such vehicle; /api/v1/vehicles lists them")
+
+
+def test_a_system_id_is_that_of_the_vehicle_and_not_of_its_group() -> None:
+    with Site() as site:
+        site.take(msg(MANUAL, Detail(1, 192, members=("rover", "arm")), "robot"), msg(AUTO, Detail(1, 1), "rover"))
+        assert [line["handle"] for line in site.ask("/api/v1/vehicles").json] == ["robot", "rover"]
+        for which, handle in (("1", "rover"), ("1.1", "rover"), ("1.192", "robot"), ("robot", "robot")):
+            assert site.ask(f"/api/v1/vehicles/{which}").json["handle"] == handle
 
 
 def test_the_schema_is_that_of_the_package() -> None:
@@ -97,7 +105,7 @@ def test_the_page_loads_nothing_from_other_hosts() -> None:
             r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(|style=\"|\son[a-z]+=\"", text
         )
         for name in re.findall(r"(?:from |href=|src=)\"(?:\./)?([\w.]+\.(?:js|css|svg))\"", text):
-            assert (folder / name).is_file() or name == "fields.js"  # generated from the table of fields
+            assert (folder / name).is_file() or name in GENERATED
 
 
 def test_a_change_is_sent_as_an_event() -> None:

@@ -35,8 +35,9 @@ def test_a_loopback_address_needs_no_other_option(text: str, host: str, port: in
     assert (found.host, found.port, found.token) == (host, port, None)
 
 
-def test_the_default_is_this_computer() -> None:
+def test_the_default_is_this_computer_without_alarms() -> None:
     assert read({}) == WebSettings("127.0.0.1", 8765)
+    assert read({"alarm": True}) == WebSettings("127.0.0.1", 8765, alarm=True)
 
 
 @pytest.mark.parametrize("text", ["", "here", "127.0.0.1", "127.0.0.1:", "::1:8765", "127.0.0.1:99999", "[::1:8]:x"])

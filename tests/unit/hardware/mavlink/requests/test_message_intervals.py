@@ -1,14 +1,13 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
 
 import pytest
 
 from mav_robot_status.hardware.mavlink.autopilots import ARDUPILOT, AUTOPILOTS, PX4, Autopilot
-from mav_robot_status.hardware.mavlink.autopilots.wanted import COMMON, Wanted
+from mav_robot_status.hardware.mavlink.autopilots.wanted import COMMON, METADATA, Wanted
 from mav_robot_status.hardware.mavlink.identity import Family
-from mav_robot_status.hardware.mavlink.requests.message_intervals import BUDGET, Requests, wanted_of
+from mav_robot_status.hardware.mavlink.requests.message_intervals import BUDGET, RETRIES, Requests, wanted_of
 from mav_robot_status.mavlink.definitions import CommandAck, CommandLong, RequestDataStream
 from mav_robot_status.mavlink.enumerations import (
     MAV_CMD_GET_MESSAGE_INTERVAL,
@@ -27,7 +26,7 @@ US = (1, 192)
 GET = MAV_CMD_GET_MESSAGE_INTERVAL
 FAILED = 4
 ONE = (Wanted(1, "SYS_STATUS", 1.0, 55),)
-ONLY_RATES = replace(ARDUPILOT, requests=replace(ARDUPILOT.requests, once=()))
+ONLY_RATES = ARDUPILOT._replace(requests=ARDUPILOT.requests._replace(once=()))
 """An ArduPilot of which nothing is requested once."""
 TWO = (*ONE, Wanted(33, "GLOBAL_POSITION_INT", 4.0, 40, instead=32))
 
@@ -319,7 +318,7 @@ def test_no_rate_below_the_one_seen_before_is_requested(requests: Requests) -> N
     assert command.param2 == pytest.approx(100_000, rel=0.05)
 
 
-def test_version_and_modes_are_requested_once(requests: Requests) -> None:
+def test_version_modes_and_metadata_are_requested_once(requests: Requests) -> None:
     first = asked(requests, 103.0, (), True)
     assert first is not None
     assert (first.command, first.param1) == (MAV_CMD_REQUEST_MESSAGE, MAVLINK_MSG_ID_AUTOPILOT_VERSION)
@@ -328,9 +327,40 @@ def test_version_and_modes_are_requested_once(requests: Requests) -> None:
     assert second is not None
     assert (second.command, second.param1) == (MAV_CMD_REQUEST_MESSAGE, MAVLINK_MSG_ID_AVAILABLE_MODES)
     requests.acknowledged(ack(command=MAV_CMD_REQUEST_MESSAGE), US, 103.1)
+    third = asked(requests, 103.2, (), True)
+    assert third is not None
+    assert (third.command, third.param1) == (MAV_CMD_REQUEST_MESSAGE, METADATA.id)
+    requests.delivered(METADATA.id)
+    requests.acknowledged(ack(command=MAV_CMD_REQUEST_MESSAGE), US, 103.3)
     assert answered(requests, 133.0, (), True) == []
     requests.restart(200.0)
-    assert answered(requests, 203.0, (), True) == [MAVLINK_MSG_ID_AUTOPILOT_VERSION, MAVLINK_MSG_ID_AVAILABLE_MODES]
+    assert answered(requests, 203.0, (), True) == [
+        MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+        MAVLINK_MSG_ID_AVAILABLE_MODES,
+        METADATA.id,
+    ]
+
+
+def test_metadata_that_is_lost_after_its_acknowledgement_is_requested_again(requests: Requests) -> None:
+    accepted = ack(command=MAV_CMD_REQUEST_MESSAGE)
+    times = []
+    for tick in range(400):
+        now = 103.0 + tick / 10
+        command = requests.due(now, (), PX4)
+        if isinstance(command, CommandLong):
+            requests.acknowledged(accepted, US, now)
+            if command.param1 == METADATA.id:
+                times.append(now)
+    assert times == pytest.approx([103.2 + 5 * number for number in range(RETRIES + 1)], abs=0.31)
+
+
+def test_what_is_not_wanted_is_not_requested(requests: Requests) -> None:
+    ids = []
+    while (command := requests.due(103.0, (), PX4, {METADATA})) is not None:
+        assert isinstance(command, CommandLong)
+        ids.append(int(command.param1))
+        requests.acknowledged(ack(command=command.command), US, 103.0)
+    assert ids == [MAVLINK_MSG_ID_AUTOPILOT_VERSION, MAVLINK_MSG_ID_AVAILABLE_MODES]
 
 
 def test_old_firmware_gets_the_old_command_for_its_version(requests: Requests) -> None:

@@ -18,15 +18,16 @@ NOW = Instant(1000.0, 1_800_000_000_000_000)
 NAMES = {
     1001: "FLIGHT_TERMINATION", 1002: "TERMINATION_ANNOUNCED", 2000: "FAILSAFE", 2001: "RC_LOST", 2002: "GCS_LOST",
     2003: "BATTERY_LOW", 2004: "BATTERY_CRITICAL", 2005: "ESTIMATOR", 2006: "TERRAIN", 2007: "TRAFFIC", 2008: "GPS",
-    2009: "GEOFENCE", 2010: "LEAK", 2011: "PRESSURE", 2012: "TEMPERATURE", 2013: "DEPTH_SENSOR", 4000: "EMERGENCY",
-    4001: "CRASH", 4002: "HARD_LANDING", 4003: "THRUST_LOSS", 4004: "PARACHUTE", 4005: "YAW_IMBALANCE",
-    4006: "ATTITUDE_FAILURE", 5001: "INTERNAL_ERROR", 5002: "CONFIGURATION", 5003: "WATCHDOG_RESET",
+    2009: "GEOFENCE", 2010: "LEAK", 2011: "PRESSURE", 2012: "TEMPERATURE", 2013: "DEPTH_SENSOR",
+    2014: "BATTERY_FAULT", 2015: "OFFBOARD_LOST", 2016: "MISSION", 4000: "EMERGENCY", 4001: "CRASH",
+    4002: "HARD_LANDING", 4003: "THRUST_LOSS", 4004: "PARACHUTE", 4005: "YAW_IMBALANCE", 4006: "ATTITUDE_FAILURE",
+    4007: "ESC_FAILURE", 5001: "INTERNAL_ERROR", 5002: "CONFIGURATION", 5003: "WATCHDOG_RESET",
     5004: "REBOOT_WHILE_ARMED", 6000: "TEXT_EMERGENCY", 6001: "TEXT_ALERT", 6002: "TEXT_CRITICAL", 7000: "EVENT_0",
     7001: "EVENT_1", 7002: "EVENT_2", 9001: "LINK_LOST", 9002: "SYSTEM_ID_CONFLICT",
 }  # fmt: skip
 ORDER = [
     1001, 1002, 4001, 4006, 4003, 4004, 4002, 4000, 2010, 2004, 2005, 2001, 2002, 2003, 2006, 2007, 2008, 2009, 2011,
-    2012, 2013, 4005, 5001, 5002, 5003, 5004, 2000,
+    2012, 2013, 4005, 5001, 5002, 5003, 5004, 2000, 4007, 2014, 2015, 2016, 9002, 9001,
 ]  # fmt: skip
 
 
@@ -62,7 +63,7 @@ def test_codes_fit_a_signed_16_bit_word() -> None:
 
 
 def test_the_causes_have_the_order_of_the_specification() -> None:
-    assert [CAUSES[code].priority for code in ORDER] == list(range(1, 28))
+    assert [CAUSES[code].priority for code in ORDER] == list(range(1, len(ORDER) + 1))
     for base, numbers, priority in ((3000, range(31), 100), (3100, range(32), 200), (6000, range(3), 400),
                                     (7000, range(3), 500)):  # fmt: skip
         assert [CAUSES[base + n].priority for n in numbers] == [priority + n for n in numbers]

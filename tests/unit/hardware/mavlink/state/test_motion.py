@@ -1,6 +1,10 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.state.motion import Motion, moved, settled
@@ -40,7 +44,13 @@ def test_one_slow_sample_cancels_the_start_of_a_motion() -> None:
 
 
 def test_a_sample_without_an_estimate_resets_the_motion() -> None:
-    assert driven((0, 1.0), (1, 1.0), (2, None)) == Motion()
+    assert replace(driven((0, 1.0), (1, 1.0), (2, None)), at=2) == Motion(at=2)
+
+
+def test_samples_far_apart_do_not_show_that_it_stood_still_between_them() -> None:
+    assert driven((0, 0.0), (2, 0.0), (4, 0.0)).still_since == 0
+    assert driven((0, 0.0), (3, 0.0), (4, 0.0)).still_since == 3
+    assert driven((0, 0.0), (1, 0.2), (2, 0.0)).still_since == 2
 
 
 @pytest.mark.parametrize(("speed", "expected"), [(0.45, TriState.FALSE), (0.55, TriState.TRUE)])
@@ -60,3 +70,25 @@ def test_thresholds_are_options(speed: float, expected: TriState) -> None:
     motion = Motion()
     moved(motion, speed, 0.0, True, HardwareOptions(v_on=2.0, v_off=1.0), 0)
     assert settled(motion, 9) is expected
+
+
+SPEEDS = st.sampled_from([None, 0.0, 0.1, 0.2, 0.45, 1.0])
+RATES = st.sampled_from([0.0, 0.1, 0.2])
+
+
+@given(st.lists(st.tuples(st.sampled_from([0.1, 0.6, 3.0]), SPEEDS, RATES, st.booleans()), min_size=1, max_size=12))
+def test_a_sample_says_that_it_has_changed_nothing_only_if_that_is_so(
+    samples: list[tuple[float, float | None, float, bool]],
+) -> None:
+    motion, at = Motion(), 0.0
+    for gap, speed, rate, armed in samples:
+        before, at = replace(motion), at + gap
+        unchanged = moved(motion, speed, rate, armed, OPTIONS, at)
+        same = replace(before, speed=motion.speed, at=motion.at) == motion
+        assert unchanged is (same and None not in (before.speed, speed))
+
+
+def test_a_sample_of_an_unchanged_motion_says_so() -> None:
+    fast, slow = driven((0, 1.0), (1, 1.0)), driven((0, 0.0), (2, 0.0))
+    assert moved(fast, 2.0, 0.0, True, OPTIONS, 1.1)
+    assert moved(slow, 0.1, 0.0, True, OPTIONS, 2.1)

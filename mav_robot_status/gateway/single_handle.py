@@ -1,0 +1,51 @@
+"""Publishers that serve one handle, because their receivers cannot tell whose status they get: which handle it is."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+from ..interface import DEFAULT_HANDLE_NAME
+from . import plugins
+from .controller_config import DEFAULT_CONTROLLER, handle_name, is_default, publisher_key, publishers_of
+
+if TYPE_CHECKING:
+    from ..config import Config, ControllerConfig, PublisherConfig
+
+log = logging.getLogger(__name__)
+
+
+class SingleHandles:
+    """The handle of each publisher that serves one: that of the first controller of a configuration that names it.
+
+    The default controller runs on every handle. Its publishers serve the first one of the configuration.
+    """
+
+    def __init__(self, config: Config) -> None:
+        """Raises ConfigError for an unknown publisher."""
+        self._handles: dict[tuple[str, str], str] = {}
+        self._told: set[str] = set()
+        for controller in config.controllers or (DEFAULT_CONTROLLER,):
+            name = _first_handle(config) if is_default(controller) else handle_name(controller)
+            for publisher in publishers_of(controller):
+                if plugins.declares(plugins.load(plugins.PUBLISHERS, publisher.type, controller.where), "one_handle"):
+                    self._handles.setdefault(publisher_key(publisher), name)
+
+    def serves(self, publisher: PublisherConfig, controller: ControllerConfig) -> bool:
+        """Whether a publisher serves the handle of a controller. The log names the first one that it does not."""
+        handle = handle_name(controller)
+        only = self._handles.get(publisher_key(publisher), handle)
+        if only != handle and publisher.type not in self._told:
+            self._told.add(publisher.type)
+            log.warning(
+                "%s serves one handle, '%s', and not '%s': choose another with --system N, or give each handle a "
+                "controller and a %s of its own",
+                publisher.type, only, handle, publisher.type,
+            )  # fmt: skip
+        return only == handle
+
+
+def _first_handle(config: Config) -> str:
+    if config.vehicles:
+        return config.vehicles[0].handle
+    return DEFAULT_HANDLE_NAME if config.hears_mavlink else config.interfaces[0].name

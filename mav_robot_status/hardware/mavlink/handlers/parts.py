@@ -1,0 +1,116 @@
+"""BATTERY_STATUS, ESC_INFO and OPEN_DRONE_ID_ARM_STATUS: which parts of the vehicle are faulty.
+
+A healthy report costs three comparisons, because BATTERY_STATUS is frequent. Only faults are kept. Batteries and ESCs
+count from 1, as in the texts of autopilots; their ids on the wire count from 0.
+"""
+
+from __future__ import annotations
+
+from struct import unpack
+from typing import TYPE_CHECKING, Final
+
+from ....mavlink import enumerations as mavlink
+from ....mavlink.decode import text
+from ..causes import BATTERY_CRITICAL, BATTERY_FAULT, ESC_FAILURE
+from ..state import parts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from ....clock import Instant
+    from ....mavlink.definitions import BatteryStatus, EscInfo, OpenDroneIdArmStatus
+    from ..options import HardwareOptions
+    from ..state.vehicle_state import VehicleState
+
+CHARGE_STATES: Final[dict[int, tuple[int, str]]] = {
+    mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL: (BATTERY_CRITICAL, "charge critical"),
+    mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY: (BATTERY_CRITICAL, "charge so low that damage is possible"),
+    mavlink.MAV_BATTERY_CHARGE_STATE_FAILED: (BATTERY_FAULT, "failed"),
+    mavlink.MAV_BATTERY_CHARGE_STATE_UNHEALTHY: (BATTERY_FAULT, "unhealthy"),
+}
+"""MAV_BATTERY_CHARGE_STATE: the cause and its words. LOW is a warning, not an error."""
+BATTERY_FAULTS: Final[dict[int, str]] = {
+    mavlink.MAV_BATTERY_FAULT_DEEP_DISCHARGE: "deep discharge",
+    mavlink.MAV_BATTERY_FAULT_SPIKES: "voltage spikes",
+    mavlink.MAV_BATTERY_FAULT_CELL_FAIL: "failed cell",
+    mavlink.MAV_BATTERY_FAULT_OVER_CURRENT: "over-current",
+    mavlink.MAV_BATTERY_FAULT_OVER_TEMPERATURE: "over-temperature",
+    mavlink.MAV_BATTERY_FAULT_UNDER_TEMPERATURE: "under-temperature",
+    mavlink.MAV_BATTERY_FAULT_INCOMPATIBLE_VOLTAGE: "incompatible voltage",
+    mavlink.MAV_BATTERY_FAULT_INCOMPATIBLE_FIRMWARE: "incompatible firmware",
+    mavlink.BATTERY_FAULT_INCOMPATIBLE_CELLS_CONFIGURATION: "incompatible cells",
+}
+"""MAV_BATTERY_FAULT. Any other bit is a fault too."""
+ESC_FAILURES: Final[dict[int, str]] = {
+    mavlink.ESC_FAILURE_OVER_CURRENT: "over-current",
+    mavlink.ESC_FAILURE_OVER_VOLTAGE: "over-voltage",
+    mavlink.ESC_FAILURE_OVER_TEMPERATURE: "over-temperature",
+    mavlink.ESC_FAILURE_OVER_RPM: "over-speed",
+    mavlink.ESC_FAILURE_INCONSISTENT_CMD: "inconsistent command",
+    mavlink.ESC_FAILURE_MOTOR_STUCK: "motor stuck",
+    mavlink.ESC_FAILURE_GENERIC: "failure",
+}
+"""ESC_FAILURE_FLAGS. Other bits are ignored: PX4 (EscReport.msg) has temperature warnings in bits 7 and 8."""
+TRANSMITTERS: Final[dict[int, str]] = {
+    mavlink.MAV_COMP_ID_ODID_TXRX_1: "remote ID",
+    mavlink.MAV_COMP_ID_ODID_TXRX_2: "remote ID 2",
+    mavlink.MAV_COMP_ID_ODID_TXRX_3: "remote ID 3",
+}
+"""The Remote ID transmitters by component id. What the autopilot says of one is what the first one told it."""
+
+
+def battery_status(state: VehicleState, message: BatteryStatus, now: Instant, options: HardwareOptions) -> bool:
+    """BATTERY_STATUS. Its charge_state is UNDEFINED on MAVLink 1 and on autopilots that do not set it."""
+    if not (message.fault_bitmask or message.charge_state in CHARGE_STATES or state.faulty_parts):
+        return True
+    source = f"BATTERY_STATUS id {message.id}: "
+    source += f"charge_state {message.charge_state}, fault_bitmask 0x{message.fault_bitmask:x}"
+    words: dict[int, list[str]] = {}
+    if message.charge_state in CHARGE_STATES:
+        code, word = CHARGE_STATES[message.charge_state]
+        words[code] = [word]
+    if message.fault_bitmask:
+        others = message.fault_bitmask & ~sum(BATTERY_FAULTS)
+        found = [*_named(message.fault_bitmask, BATTERY_FAULTS), *([f"fault 0x{others:x}"] if others else [])]
+        words[BATTERY_FAULT] = found  # says more than "unhealthy"
+    _report(state, f"battery {message.id + 1}", {code: ", ".join(w) for code, w in words.items()}, source, now)
+    return False
+
+
+def esc_info(state: VehicleState, message: EscInfo, now: Instant, options: HardwareOptions) -> None:
+    """ESC_INFO: four ESCs. The flags of one that is offline mean nothing.
+
+    `info` has a bit for each ESC of this message; in some versions of PX4 (ESC_INFO.hpp), of all messages.
+    """
+    if not (any(message.failure_flags) or state.faulty_parts):
+        return
+    for place, flags in enumerate(unpack("<4H", message.failure_flags)):
+        number = message.index + place
+        is_online = number < message.count and message.info & (1 << place | 1 << number)
+        found = ", ".join(_named(flags, ESC_FAILURES)) if is_online else ""
+        source = f"ESC_INFO index {message.index}: failure_flags[{place}] 0x{flags:x}"
+        _report(state, f"ESC {number + 1}", {ESC_FAILURE: found} if found else {}, source, now)
+
+
+def arm_status(state: VehicleState, message: OpenDroneIdArmStatus, now: Instant, options: HardwareOptions) -> None:
+    """OPEN_DRONE_ID_ARM_STATUS of the autopilot, which passes on what its transmitter says."""
+    transmitter_heard(state, message, mavlink.MAV_COMP_ID_ODID_TXRX_1, now)
+
+
+def transmitter_heard(state: VehicleState, message: OpenDroneIdArmStatus, component: int, now: Instant) -> None:
+    """OPEN_DRONE_ID_ARM_STATUS of a transmitter, a component of the vehicle's system."""
+    is_ready = message.status == mavlink.MAV_ODID_ARM_STATUS_GOOD_TO_ARM
+    words = text(message.error).strip() or "not ready to arm"
+    source = f"OPEN_DRONE_ID_ARM_STATUS of component {component}: status {message.status}"
+    _report(state, TRANSMITTERS[component], {} if is_ready else {parts.NOT_READY: words}, source, now)
+
+
+def _named(flags: int, names: Mapping[int, str]) -> Iterable[str]:
+    return (name for bit, name in names.items() if flags & bit)
+
+
+def _report(state: VehicleState, part: str, found: Mapping[int, str], source: str, now: Instant) -> None:
+    """Note what a part reports. Nothing changes if it has no fault and had none."""
+    if found or any(name == part for name, _ in state.faulty_parts):
+        state.faulty_parts = parts.heard(state.faulty_parts, part, found, source, now)
+        state.latest.unsettled = True

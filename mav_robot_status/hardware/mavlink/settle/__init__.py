@@ -1,0 +1,6 @@
+"""Settles the facts of a vehicle, from its state, the options and a `Moment`. Each has its function."""
+
+from .causes import faults
+from .table import SETTLE, Settle, claimed, facts_of, fresh
+
+__all__ = ["SETTLE", "Settle", "claimed", "facts_of", "faults", "fresh"]

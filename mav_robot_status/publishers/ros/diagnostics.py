@@ -1,0 +1,108 @@
+"""A status as a DiagnosticStatus: its level, its headline, and each field, inhibit and error as a text. Pure functions.
+
+Levels follow diagnostic_msgs/msg/DiagnosticStatus. rqt_robot_monitor, Foxglove and diagnostic_aggregator show them.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import TYPE_CHECKING, Final
+
+from ...interface import FIELDS, STATES, LinkState, TriState
+from ...values import NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from ...interface import Detail, ErrorCause, Inhibit, RobotStatus, RobotStatusMsg
+
+    Test = Callable[[RobotStatus, Detail], object]
+
+NODE: Final = "mav_robot_status"
+"""The name of our node. By convention the name of a DiagnosticStatus starts with it."""
+
+
+class Level(IntEnum):
+    """DiagnosticStatus.level."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+class DiagnosticStatus(NamedTuple):
+    """diagnostic_msgs/msg/DiagnosticStatus."""
+
+    level: Level
+    name: str
+    message: str
+    hardware_id: str
+    values: tuple[tuple[str, str], ...]
+
+
+def _lost(status: RobotStatus, detail: Detail) -> bool:
+    return detail.link is not LinkState.CONNECTED
+
+
+def _unclear(status: RobotStatus, detail: Detail) -> bool:
+    return any(getattr(status, field.name) == TriState.UNKNOWN for field in STATES)
+
+
+LEVELS: Final[tuple[tuple[Test, Level], ...]] = (
+    (_lost, Level.STALE),
+    (lambda status, detail: status.in_error is TriState.TRUE, Level.ERROR),
+    (lambda status, detail: status.motion_possible is not TriState.TRUE, Level.WARN),
+    (_unclear, Level.WARN),
+    (lambda status, detail: True, Level.OK),
+)
+"""The first that applies. UNKNOWN is -1 in a mode as well as in a tri-state."""
+
+HEADLINES: Final[tuple[tuple[Test, str], ...]] = (
+    (lambda status, detail: detail.link is LinkState.NEVER_SEEN, "NEVER SEEN"),
+    (_lost, "NO LINK: its state is unknown, it may move"),
+    (lambda status, detail: status.in_motion is TriState.TRUE, "MOVING"),
+    (lambda status, detail: status.e_stopped is TriState.TRUE, "EMERGENCY STOP"),
+    (lambda status, detail: status.motion_possible is TriState.TRUE, "MOTION POSSIBLE"),
+    (lambda status, detail: status.motion_possible is TriState.FALSE, "MOTION NOT POSSIBLE"),
+    (lambda status, detail: True, "UNKNOWN: it may move"),
+)
+"""The first that applies. What moves is never called stopped."""
+
+
+def level(status: RobotStatus, detail: Detail) -> Level:
+    """How much a person should care."""
+    return next(level for applies, level in LEVELS if applies(status, detail))
+
+
+def headline(status: RobotStatus, detail: Detail) -> str:
+    """The status in one line, with its first reason: an error, or what inhibits the motion of a robot at rest."""
+    words = next(words for applies, words in HEADLINES if applies(status, detail))
+    reasons: tuple[ErrorCause | Inhibit, ...] = () if _lost(status, detail) else detail.errors
+    if not (reasons or _lost(status, detail) or status.in_motion is TriState.TRUE):
+        reasons = detail.inhibits
+    return f"{words}: {_reason(reasons[0])}" if reasons else words
+
+
+def diagnostic_status(msg: RobotStatusMsg) -> DiagnosticStatus:
+    """The whole status of one handle."""
+    name = f"{NODE}: {msg.handle}"
+    words = headline(msg.status, msg.detail)
+    return DiagnosticStatus(level(msg.status, msg.detail), name, words, msg.handle, tuple(_values(msg)))
+
+
+def _values(msg: RobotStatusMsg) -> Iterator[tuple[str, str]]:
+    for field in FIELDS:
+        yield field.name, field.word(getattr(msg.status, field.name))
+    for error in msg.detail.errors:
+        yield f"error {error.code}", _reason(error)
+    for inhibit in msg.detail.inhibits:
+        yield f"inhibit {inhibit.name}", inhibit.text or ""
+    yield "link", msg.detail.link.value
+    for name, value in msg.detail.vehicle._asdict().items():
+        if value is not None:
+            yield name, str(value)
+
+
+def _reason(reason: ErrorCause | Inhibit) -> str:
+    return f"{reason.name} ({reason.text})" if reason.text else reason.name

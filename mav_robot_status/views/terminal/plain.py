@@ -1,0 +1,128 @@
+"""The table without Textual: drawn again and again on a terminal, or one line for each change in a pipe."""
+
+from __future__ import annotations
+
+import os
+import select
+import termios
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
+from typing import Final
+
+from .columns import Column, cell, columns, head
+from .details import details
+from .robots import Memory, Robot, Source, counts, in_order
+from .text import Line, Signs, Span, wrap
+
+PERIOD: Final = 0.25
+"""Seconds between two drawings."""
+WIDE: Final = 240
+"""The width of a line in a pipe, in cells. It takes less than the 4096 bytes for which a writable pipe has room."""
+PALETTE: Final = ("black", "red", "green", "yellow", "blue", "magenta", "cyan", "white")
+CODES: Final = {"bold": 1, "dim": 2} | {name: 30 + i for i, name in enumerate(PALETTE)}
+GROUNDS: Final = {f"on {name}": 40 + i for i, name in enumerate(PALETTE)}
+
+
+def screen(source: Source, robots: list[Robot], size: os.terminal_size, signs: Signs) -> Iterator[Line]:
+    """The lines of one screen: the counts, the table, the details of as many robots as fit, and the log."""
+    number, of_filter = counts(robots)
+    told = "".join(f", {count} {word}" for word, count in of_filter.items() if count)
+    yield (Span(f"{source.connection}  {number} robot{'' if number == 1 else 's'}{told}", "bold"),)
+    ordered = in_order(robots)
+    shown = columns(size.columns, ordered)
+    yield head(shown)
+    yield from (_row(shown, robot, signs) for robot in ordered)
+    if not robots:
+        yield (Span(f"No heartbeat of an autopilot yet. {source.advice}"),)
+    for robot in ordered:
+        yield ()
+        yield from details(robot, signs)
+
+
+def _row(shown: Sequence[Column], robot: Robot, signs: Signs) -> Line:
+    return tuple(span for column in shown for span in cell(column, robot, signs))
+
+
+def frame(lines: Iterator[Line], last: list[Line], size: os.terminal_size, colours: bool) -> str:
+    """The lines as one text for the terminal, cut to its size. The `last` ones stand at its bottom."""
+    room = size.lines - len(last)
+    body: list[Line] = []
+    for line in lines:
+        body += wrap(line, size.columns)
+        if len(body) >= room:
+            break
+    body = body[:room] + [()] * (room - len(body)) + [next(wrap(line, size.columns)) for line in last]
+    return "\x1b[H" + "\x1b[K\r\n".join(_painted(line, colours) for line in body) + "\x1b[K\x1b[J"
+
+
+def _painted(line: Line, colours: bool) -> str:
+    runs = [(style, "".join(span.text for span in run)) for style, run in groupby(line, key=lambda span: span.style)]
+    return "".join(f"\x1b[{_sgr(style)}m{text}\x1b[0m" if style and colours else text for style, text in runs)
+
+
+def _sgr(style: str) -> str:
+    words, _, ground = style.partition("on ")
+    codes = [CODES[word] for word in words.split()] + ([GROUNDS[f"on {ground}"]] if ground else [])
+    return ";".join(map(str, codes))
+
+
+def redraw(source: Source, signs: Signs, footer: Callable[[], Sequence[str]]) -> None:
+    """Draw the table, and below it the lines of `footer`, until the source ends. A signal raises KeyboardInterrupt."""
+    reader = _reader()
+    memory, colours, drawn = Memory(), "NO_COLOR" not in os.environ, ""
+    _write("\n" * (os.get_terminal_size(1).lines - 1))  # what was on the screen can be scrolled back to
+    try:
+        while not source.wait(PERIOD):
+            size = os.get_terminal_size(1)
+            robots = memory.robots(source.rows(), source.now())
+            last: list[Line] = [(Span(signs.text(text), "bold"),) for text in footer()]
+            text = frame(screen(source, robots, size, signs), last, size, colours)
+            if text != drawn and _has_room(reader):
+                _write(text)
+                drawn = text
+    except KeyboardInterrupt:
+        # a terminal that nobody reads is full: without room the closing lines of the log would wait for a reader
+        termios.tcflush(1, termios.TCOFLUSH)
+        raise
+    finally:
+        if _has_room(reader):
+            _write("\n")
+
+
+def print_changes(source: Source, signs: Signs, descriptor: int = 1) -> None:
+    """Write a line for each change of a robot. It waits for no slow reader, which later gets the latest status.
+
+    Raises BrokenPipeError after the reader has closed its end.
+    """
+    memory, versions, reader, ended = Memory(), dict[str, int](), _reader(descriptor), False
+    shown = columns(WIDE, [])
+    waiting = f"{'time':<23}" + "".join(span.text for span in head(shown)).rstrip() + "\n"
+    while not ended:
+        ended = source.wait(PERIOD)
+        for robot in memory.robots(source.rows(), source.now()):
+            if versions.get(robot.handle) != robot.row.version and _has_room(reader):
+                versions[robot.handle] = robot.row.version
+                text = "".join(span.text for span in _row(shown, robot, signs)).rstrip()
+                _write(waiting + f"{robot.row.stamp[:21]}Z {text}\n", descriptor)
+                waiting = ""
+        _has_room(reader)
+
+
+def _reader(descriptor: int = 1) -> select.poll:
+    reader = select.poll()
+    reader.register(descriptor, select.POLLOUT)
+    return reader
+
+
+def _has_room(reader: select.poll) -> bool:
+    """Whether a write of one line does not block."""
+    events = reader.poll(0)
+    if events and events[0][1] & (select.POLLERR | select.POLLHUP | select.POLLNVAL):
+        raise BrokenPipeError("the reader of the table has closed its end")
+    return bool(events)
+
+
+def _write(text: str, descriptor: int = 1) -> None:
+    data = text.encode()
+    while data:
+        data = data[os.write(descriptor, data) :]

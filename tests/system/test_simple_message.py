@@ -342,9 +342,9 @@ def test_a_port_serves_one_vehicle_and_one_line_says_how_to_choose_another(
     connect(chosen).wait_for(drives_powered=1)
 
 
-def both(ports: list[str]) -> list[str]:
-    """Two ports, or none."""
-    return ports if len(ports) == 2 else []
+def both(places: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Two addresses, or none."""
+    return places if len(places) == 2 else []
 
 
 def test_each_controller_can_have_a_port_of_its_own(
@@ -364,8 +364,9 @@ def test_each_controller_can_have_a_port_of_its_own(
     gate = gateway("udpin:127.0.0.1:0", "--config", str(config))
     wire(gate.address).beating()
     wire(gate.address, system=2).beating().beat(armed=True)
-    ports = wait_until(lambda: both(re.findall(r"simple_message: listening on \S+:(\d+)/tcp", "\n".join(gate.log))))
-    rover, boat = (connect(("127.0.0.1", int(port))) for port in ports)
+    listening = r"simple_message: listening on (\S+):(\d+)/tcp"
+    places = wait_until(lambda: both(re.findall(listening, "\n".join(gate.log))))
+    rover, boat = (connect((host.strip("[]"), int(port))) for host, port in places)
     rover.wait_for(drives_powered=0)
     boat.wait_for(drives_powered=1)
     assert rover.status().drives_powered == 0

@@ -102,8 +102,9 @@ def test_a_token_is_required_and_never_logged(gateway: Callable[..., Gateway], t
     token.chmod(0o600)
     gate = gateway("udpin:127.0.0.1:0", "--http", "0.0.0.0:0", "--http-token-file", str(token))
     page = url(gate).replace("0.0.0.0", "127.0.0.1")
-    with pytest.raises(urllib.error.HTTPError, match="401"):
+    with pytest.raises(urllib.error.HTTPError, match="401") as refused:
         get(f"{page}/api/v1/vehicles")
+    refused.value.close()
     assert get(f"{page}/api/v1/vehicles", Authorization="Bearer correct-horse-battery") == []
     gate.stop()
     assert "correct-horse" not in "".join(gate.log)

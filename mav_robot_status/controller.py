@@ -16,7 +16,7 @@ from .errors import ConfigError
 from .interface import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle, IndustrialRobotStatusInterface, RobotStatusMsg
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from .clock import Instant
     from .interface import Detail, InterfaceManager, Publisher, RobotStatus
@@ -32,10 +32,11 @@ RETRY: Final = 0.02  # s until a busy publisher is tried again
 class _Output:
     """One publisher, and what was published to it."""
 
-    __slots__ = ("changes", "due", "last", "publisher", "sent", "skipped", "waiting")
+    __slots__ = ("changes", "due", "last", "publisher", "rests_until", "sent", "skipped", "waiting")
 
-    def __init__(self, publisher: Publisher, start: float, rate: float) -> None:
+    def __init__(self, publisher: Publisher, start: float, rate: float, may_rest: bool) -> None:
         self.publisher = publisher
+        self.rests_until: Callable[[str], float] = getattr(publisher, "rests_until", _never) if may_rest else _never
         self.last = start
         """When the last periodic message was due; it keeps the phase."""
         self.due = _strictly_after(start, rate)
@@ -84,7 +85,8 @@ class IndustrialRobotStatusController:
 
     def starting(self, time: Instant) -> None:
         """Start publishing. The first periodic message is due one period after `time`."""
-        self._outputs = [_Output(publisher, time.mono, self.publish_rate) for publisher in self._publishers]
+        on_change = self.publish_on_change  # otherwise a periodic message is the first that shows a change
+        self._outputs = [_Output(p, time.mono, self.publish_rate, on_change) for p in self._publishers]
 
     def update(self, time: Instant, period: float) -> None:
         """Publish what is due at `time`. `period` (seconds since the last update) is ros_control's; it is not used.
@@ -98,7 +100,7 @@ class IndustrialRobotStatusController:
             self._sent = status, detail
         msg: RobotStatusMsg | None = None
         for output in self._outputs:
-            due = now >= output.due and output.publisher.periodic
+            due = now >= output.due and output.publisher.periodic and now >= output.rests_until(handle.name)
             if not due and not (self._has_changed(output) and self._may_change(output, now)):
                 continue
             if output.publisher.busy():
@@ -139,7 +141,7 @@ class IndustrialRobotStatusController:
             last = None
         for output in self._outputs:
             if output.due < due and output.publisher.periodic:
-                due = output.due
+                due = min(due, max(output.due, output.rests_until(handle.name)))
             if (output.sent is not last or last is None) and self._has_changed(output):
                 full = len(output.changes) == MOST_CHANGES
                 due = min(due, output.changes[0] + WINDOW if full else now)
@@ -169,6 +171,11 @@ class IndustrialRobotStatusController:
     def _may_change(self, output: _Output, now: float) -> bool:
         changes = output.changes
         return len(changes) < MOST_CHANGES or now >= changes[0] + WINDOW
+
+
+def _never(handle: str) -> float:
+    """A publisher that takes each periodic message."""
+    return -math.inf
 
 
 def _strictly_after(last: float, rate: float) -> float:

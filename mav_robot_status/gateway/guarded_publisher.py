@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from ..errors import MavRobotStatusError
@@ -62,6 +63,12 @@ class GuardedPublisher:
     def service(self, now: Instant) -> float | None:
         """Do pending work."""
         return self._guard.call(None, self._publisher.service, now)
+
+    def rests_until(self, handle: str) -> float:
+        """Until when it has no use for a periodic message; -inf if it does not say, or after a failure."""
+        rests_until = getattr(self._publisher, "rests_until", None)
+        found = self._guard.call(None, rests_until, handle) if callable(rests_until) else None
+        return found if isinstance(found, int | float) and not math.isnan(found) else -math.inf
 
     def forget(self, handle: str) -> None:
         """Release what belongs to a handle that is gone."""

@@ -17,8 +17,13 @@ if TYPE_CHECKING:
 class Publisher(Protocol):
     """One output. No method blocks: a publisher that cannot accept a message is `busy`, and is tried again soon.
 
-    A publisher may have one more method, `forget(handle)`: this handle is gone, and no message of it follows. Its last
-    message has the link state NEVER_SEEN. Release what belongs to the handle.
+    A publisher may have two more methods:
+
+    - `forget(handle)`: this handle is gone, and no message of it follows. Its last message has the link state
+      NEVER_SEEN. Release what belongs to the handle.
+    - `rests_until(handle) -> float`: until when (monotonic seconds) it has no use for a periodic message of this
+      handle. A controller leaves those out, and publishes each change nevertheless. It asks after each message; if
+      the time becomes an earlier one, return `now` in `service`.
 
     A publisher class may set three more attributes. All default to False:
 

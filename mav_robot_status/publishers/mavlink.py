@@ -58,19 +58,28 @@ class MavlinkPublisher(RateLimitedPublisher[Schedule]):
             audiences = {audience.key: audience for audience in self._port.audiences()}
             for key, system in requests:
                 if key in audiences:
-                    self._send_once(audiences[key], system)
+                    self._send_once(audiences[key], system, now)
         return again
 
     def send_due(self, msg: RobotStatusMsg, system: int, audience: Audience, state: Schedule, now: float) -> float:
         """Send the status if it is due."""
-        interval = PERIODS[ROBOT_STATUS] if audience.interval is None else audience.interval
-        due = state.due(msg, (msg.status, msg.detail), interval, now)
+        due = state.due(msg, (msg.status, msg.detail), _interval(audience), now)
         if due > now:
             return due
         self._port.send(message_of(msg), system, audience)
         return math.inf
 
-    def _send_once(self, audience: Audience, system: int) -> None:
+    def next_periodic(self, audience: Audience, state: Schedule) -> float:
+        """An interval after the last one."""
+        return state.last + _interval(audience)
+
+    def _send_once(self, audience: Audience, system: int, now: Instant) -> None:
+        """Send what the controllers published last. It is the present status, because they publish each change."""
         for msg in self._latest.values():
             if msg.detail.system == system:
-                self._port.send(message_of(msg), system, audience)
+                self._port.send(message_of(msg._replace(unix_us=now.unix_us)), system, audience)
+
+
+def _interval(audience: Audience) -> float:
+    """Seconds between two periodic messages."""
+    return PERIODS[ROBOT_STATUS] if audience.interval is None else audience.interval

@@ -77,6 +77,10 @@ class NamedValuePublisher(RateLimitedPublisher[_Sent]):
         """Send the values and the text if they are due; return when the next one will be due, or inf."""
         return min(self._values(msg, system, audience, sent, now), self._text(msg, system, audience, sent, now))
 
+    def next_periodic(self, audience: Audience, sent: _Sent) -> float:
+        """An interval after the last values."""
+        return sent.values.last + VALUE_INTERVAL
+
     def _values(self, msg: RobotStatusMsg, system: int, audience: Audience, sent: _Sent, now: float) -> float:
         values = packed(msg.status), msg.status.error_code
         due = sent.values.due(msg, values, VALUE_INTERVAL, now)

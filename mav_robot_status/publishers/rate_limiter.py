@@ -26,10 +26,10 @@ S = TypeVar("S")
 class Schedule:
     """The last messages about one handle, sent to one audience, and their times."""
 
-    __slots__ = ("_changes", "_content", "_last", "_settled")
+    __slots__ = ("_changes", "_content", "_settled", "last")
 
     def __init__(self) -> None:
-        self._last = -math.inf
+        self.last = -math.inf
         """The nominal time of the last periodic message. It keeps the phase."""
         self._content: object = None
         self._changes: deque[float] = deque(maxlen=MOST_CHANGES)
@@ -43,17 +43,17 @@ class Schedule:
         """
         if msg is self._settled:
             return math.inf
-        periodic = now - self._last >= interval - SLACK
+        periodic = now - self.last >= interval - SLACK
         changed = content != self._content
         if not periodic and changed and len(self._changes) == MOST_CHANGES and now < self._changes[0] + WINDOW:
-            return min(self._changes[0] + WINDOW, self._last + interval)
+            return min(self._changes[0] + WINDOW, self.last + interval)
         self._settled = msg
         if not periodic and not changed:
             return math.inf
         if periodic:
             # a fixed phase: otherwise jitter adds up and lowers the rate
-            late = now - self._last >= 2 * interval
-            self._last = now if late else self._last + interval
+            late = now - self.last >= 2 * interval
+            self.last = now if late else self.last + interval
         else:
             self._changes.append(now)
         self._content = content
@@ -87,6 +87,8 @@ class RateLimitedPublisher(ABC, Generic[S]):
         self._latest: dict[str, RobotStatusMsg] = {}
         self._waiting: dict[str, None] = {}
         """Handles with a message that may be due, in order of arrival."""
+        self._rests: dict[str, float] = {}
+        """When the first periodic message of each handle will be due, monotonic seconds."""
 
     @abstractmethod
     def wants(self, audience: Audience) -> bool:
@@ -95,6 +97,10 @@ class RateLimitedPublisher(ABC, Generic[S]):
     @abstractmethod
     def send_due(self, msg: RobotStatusMsg, system: int, audience: Audience, state: S, now: float) -> float:
         """Send a message if it is due; return when a delayed message will be due, or inf."""
+
+    @abstractmethod
+    def next_periodic(self, audience: Audience, state: S) -> float:
+        """When the next periodic message to this audience will be due, monotonic seconds."""
 
     def busy(self) -> bool:
         """Never. A message beyond the limit is delayed, and a newer one replaces it."""
@@ -114,49 +120,65 @@ class RateLimitedPublisher(ABC, Generic[S]):
         if self._audiences:
             self._waiting[msg.handle] = None
 
+    def rests_until(self, handle: str) -> float:
+        """Until when a periodic message of this handle is of no use: none is due before."""
+        return self._rests.get(handle, -math.inf)
+
     def service(self, now: Instant) -> float | None:
         """Send due messages; return when a delayed change will be due."""
         offered = self._port.audiences()
         if offered is not self._offered:
             self._offered = offered
-            self._serve([audience for audience in offered if self.wants(audience)])
+            rested = self._serve([audience for audience in offered if self.wants(audience)])
             if self._audiences and not self.periodic:
                 self.periodic = True
                 if self._waiting:  # held since the last change: the pipeline first has them published again
                     return now.mono
             self.periodic = bool(self._audiences)
+            if rested and self._audiences:
+                self._send_waiting(now.mono)
+                return now.mono  # a controller that rests asks again
         if not self._waiting:
             return None
-        again, waiting, self._waiting = math.inf, self._waiting, {}
-        for handle in waiting:
-            due = self._send_to_all(handle, now.mono)
-            if due < math.inf:
-                self._waiting[handle] = None
-                again = min(again, due)
-        return None if again == math.inf else again
+        return self._send_waiting(now.mono)
 
     def forget(self, handle: str) -> None:
         """Release what belongs to a handle that is gone."""
         self._latest.pop(handle, None)
+        self._rests.pop(handle, None)
         for states in self._states.values():
             states.pop(handle, None)
 
     def close(self) -> None:
         """Nothing to release."""
 
-    def _serve(self, audiences: list[Audience]) -> None:
-        """Send to these from now on."""
-        if audiences != self._audiences:
-            self._audiences = audiences
-            self._states = {a.key: self._states.get(a.key, {}) for a in audiences}
-            self._waiting = dict.fromkeys(self._latest) if audiences else {}
+    def _serve(self, audiences: list[Audience]) -> bool:
+        """Send to these from now on. Returns whether a controller rests for the sake of the ones before."""
+        if audiences == self._audiences:
+            return False
+        rested = bool(self._rests)
+        self._audiences = audiences
+        self._rests.clear()
+        self._states = {a.key: self._states.get(a.key, {}) for a in audiences}
+        self._waiting = dict.fromkeys(self._latest) if audiences else {}
+        return rested
+
+    def _send_waiting(self, now: float) -> float | None:
+        """Send the due messages; return when a delayed change will be due."""
+        again, waiting, self._waiting = math.inf, self._waiting, {}
+        for handle in waiting:
+            due = self._send_to_all(handle, now)
+            if due < math.inf:
+                self._waiting[handle] = None
+                again = min(again, due)
+        return None if again == math.inf else again
 
     def _send_to_all(self, handle: str, now: float) -> float:
         """Send the message of one handle to every audience; return when a delayed message will be due."""
         msg = self._latest.get(handle)
         if msg is None or msg.detail.system is None:
             return math.inf
-        due = math.inf
+        due = rests = math.inf
         for audience in self._audiences:
             if audience.systems is not None and msg.detail.system not in audience.systems:
                 continue
@@ -165,4 +187,9 @@ class RateLimitedPublisher(ABC, Generic[S]):
             if state is None:
                 state = states[handle] = self.state_type()
             due = min(due, self.send_due(msg, msg.detail.system, audience, state, now))
+            rests = min(rests, self.next_periodic(audience, state) - SLACK)
+        if rests < math.inf and due == math.inf:
+            self._rests[handle] = rests
+        else:
+            self._rests.pop(handle, None)
         return due

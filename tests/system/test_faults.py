@@ -30,6 +30,7 @@ from .wire import Wire
 LOST, CONNECTED = "LOST", "CONNECTED"
 GROWTH = 5.0  # MB
 FLOOD = 200_000  # frames
+RATE = 50_000  # frames/s on an idle machine
 STOPPED = 5.0  # s, longer than heartbeat_timeout
 HOUR = timedelta(hours=1)
 
@@ -198,13 +199,14 @@ def test_a_flood_from_a_stranger_neither_hides_the_vehicle_nor_makes_it_grow(
     datagram = b"".join(frames)
     stop = threading.Event()
     count = 0
+    each = allow(1 / RATE)  # a machine that cannot read as much loses the frames of the rover, too
 
     def flood() -> None:
         nonlocal count
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.connect(gate.address)
             start = time.monotonic()
-            while not stop.wait(max(0.0, start + count / 50_000 - time.monotonic())):
+            while not stop.wait(max(0.0, start + count * each - time.monotonic())):
                 with contextlib.suppress(OSError):
                     sender.send(datagram)
                 count += len(frames)
@@ -225,7 +227,7 @@ def test_a_flood_from_a_stranger_neither_hides_the_vehicle_nor_makes_it_grow(
     finally:
         stop.set()
         thread.join()
-    assert in_time(time.monotonic() - started, count / 40_000)
+    assert in_time(time.monotonic() - started, 1.25 * count / RATE)
     assert gate.stop() == 0
 
 

@@ -591,8 +591,10 @@ def test_beyond_the_limit_the_oldest_events_are_dropped_and_counted(
     at.stop()
     gateway = feeder(at.url, *("--rate", "100", "--changes", "400", "--option", "spool_size=0.05"))
     gateway.wait_for(300)
+    gateway.process.send_signal(signal.SIGSTOP)  # until the listener is there
     at.start()
     heard = listener(at.port)
+    gateway.process.send_signal(signal.SIGCONT)
     last = heard.wait_for(lambda h: h.what == "events" and '"new": 400}' in h.text, 20)
     told = changes(heard.of("events"))
     assert told == list(range(401 - len(told), 401))

@@ -212,6 +212,39 @@ def test_an_output_that_is_not_periodic_gets_no_periodic_messages() -> None:
     assert len(periodic.messages) > 5
 
 
+class Resting(Collector):
+    """A publisher that has no use for periodic messages within a second of the last one."""
+
+    def rests_until(self, handle: str) -> float:
+        assert handle == DEFAULT_HANDLE_NAME
+        return START.mono + self.times[-1] + 1.0 if self.messages else -math.inf
+
+
+def test_an_output_that_rests_gets_changes_and_no_periodic_messages() -> None:
+    busy, resting = Collector(), Resting()
+    rig = Rig({"publish_rate": 10}, busy, resting)
+    rig.update(*steps(0.5, 0.05))
+    rig.change(1)
+    rig.update(0.52)
+    rig.update(*(0.55 + step for step in steps(1.2, 0.05)))
+    assert resting.times == pytest.approx([0.05, 0.52, 1.55])
+    assert len(busy.messages) > 15
+
+
+def test_a_controller_sleeps_while_its_only_output_rests() -> None:
+    rig = Rig({"publish_rate": 10}, Resting())
+    rig.update(0.0)
+    assert rig.next_due(0.0) == pytest.approx(1.0)
+    rig.change(1)
+    assert rig.next_due(0.3) == pytest.approx(0.3, abs=0.03)
+
+
+def test_no_output_rests_while_a_change_shows_in_periodic_messages_only() -> None:
+    rig = Rig(PERIODIC_ONLY, Resting())
+    rig.update(*steps(0.95, 0.05))
+    assert len(rig.out.messages) == 9
+
+
 def test_a_stall_is_not_followed_by_a_burst() -> None:
     rig = Rig(PERIODIC_ONLY)
     rig.update(0.11, 5.03, 5.04, 5.05, 5.09)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import logging
+import math
 
 import pytest
 
@@ -41,6 +42,23 @@ def test_a_publishers_counters_are_passed_on_if_they_are_numbers(told: object, c
     publisher.queued = publisher.dropped = told  # type: ignore[attr-defined]
     guarded = GuardedPublisher(publisher, "mine")
     assert (guarded.queued, guarded.dropped) == (counted, counted)
+
+
+@pytest.mark.parametrize(
+    ("told", "taken"), [(3.5, 3.5), (None, -math.inf), ("later", -math.inf), (math.nan, -math.inf)]
+)
+def test_a_publisher_rests_until_the_time_that_it_says(told: object, taken: float) -> None:
+    publisher = Faulty(ValueError())
+    publisher.rests_until = lambda handle: told  # type: ignore[attr-defined]
+    assert GuardedPublisher(publisher, "mine").rests_until("robot") == taken
+
+
+def test_a_publisher_that_says_nothing_or_fails_does_not_rest() -> None:
+    publisher = Faulty(ValueError())
+    guarded = GuardedPublisher(publisher, "mine")
+    assert guarded.rests_until("robot") == -math.inf
+    publisher.rests_until = lambda handle: 1 / 0  # type: ignore[attr-defined]
+    assert guarded.rests_until("robot") == -math.inf
 
 
 def test_a_guard_returns_the_result_of_the_function() -> None:

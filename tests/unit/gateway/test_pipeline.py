@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import io
+import itertools
 import json
 import logging
 from collections.abc import Iterator
@@ -158,6 +159,21 @@ def test_if_nobody_takes_periodic_messages_the_pipeline_sleeps_until_an_audience
     assert times[0] == pytest.approx(40.0e6, abs=0.2e6)
     assert len(times) == pytest.approx(6, abs=1)
     pipeline.close(now)
+
+
+def test_with_changes_only_the_pipeline_wakes_for_the_messages_to_an_audience_alone(stdout: TextIO) -> None:
+    port = Port(HEARER)
+    publishers = PublisherConfig("json", {"changes_only": True}), PublisherConfig("mavlink")
+    pipeline = made(Config(controllers=(controller("c", OURS, *publishers),)), port, stdout)
+    take(pipeline, heartbeat(), START)
+    pipeline.tick(START)
+    live(pipeline, START, 10.0)
+    port.sent.clear()
+    assert live(pipeline, later(START, 10.0), 20.0) <= 2 * 20 + 20
+    times = [sent.message.time_usec / 1e6 for sent in port.sent]
+    assert [b - a for a, b in itertools.pairwise(times)] == pytest.approx([1.0] * (len(times) - 1), abs=0.02)
+    assert len(times) == pytest.approx(20, abs=1)
+    pipeline.close(START)
 
 
 def test_a_controller_is_updated_only_when_its_handle_changes_or_it_is_due(

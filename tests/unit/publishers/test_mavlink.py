@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from mav_robot_status.clock import Instant
 from mav_robot_status.errors import UsageError
 from mav_robot_status.interface import (
     Audience,
@@ -207,10 +208,43 @@ def test_each_audience_has_its_own_limit_on_changes(publisher: MavlinkPublisher,
         publish(publisher, number * 0.01, failing(number))
     port.taken()
     port.present.append(ROVER)
-    assert publish(publisher, 0.1, failing(6)) == 1.0
+    assert publish(publisher, 0.1, failing(6)) == 0.1  # the controllers ask again how long it rests
+    assert publish(publisher, 0.1) == 1.0
     assert [s.key for s in port.taken()] == ["rover"]
     publish(publisher, 1.0)
     assert [(s.key, s.message.error_code) for s in port.sent] == [("station", 6)]
+
+
+def test_it_rests_until_the_first_audience_is_due(publisher: MavlinkPublisher, port: Port) -> None:
+    assert publisher.rests_until("robot") == -math.inf
+    port.present = [STATION, ROVER._replace(interval=0.5)]
+    publish(publisher, 0.0, msg())
+    assert publisher.rests_until("robot") == pytest.approx(0.5, abs=0.02)
+    publish(publisher, 0.5, msg())
+    assert publisher.rests_until("robot") == pytest.approx(1.0, abs=0.02)
+    assert publisher.rests_until("other") == -math.inf
+
+
+def test_it_does_not_rest_while_a_change_waits(publisher: MavlinkPublisher) -> None:
+    for number in range(7):
+        publish(publisher, number * 0.01, failing(number))
+    assert publisher.rests_until("robot") == -math.inf
+
+
+def test_a_new_audience_ends_the_rest(publisher: MavlinkPublisher, port: Port) -> None:
+    publish(publisher, 0.0, msg())
+    port.present = [STATION._replace(interval=0.1)]
+    assert publish(publisher, 0.05) == 0.05
+    publish(publisher, 0.1, msg())
+    assert publisher.rests_until("robot") == pytest.approx(0.2, abs=0.02)
+
+
+def test_the_answer_to_a_request_has_the_present_time(publisher: MavlinkPublisher, port: Port) -> None:
+    publish(publisher, 0.0, msg())
+    port.taken()
+    port.asked = [("station", 1)]
+    publisher.service(Instant(0.7, 700_000))
+    assert [sent.message.time_usec for sent in port.taken()] == [700_000]
 
 
 @pytest.mark.parametrize("interval", [None, math.inf])

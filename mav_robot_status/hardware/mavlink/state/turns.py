@@ -65,9 +65,10 @@ class Turns:
                 continue
             runs.append((value, now, counted))
             del runs[: -rule.runs]
+            if len(runs) < rule.runs or not PERIOD <= now - runs[0][1] <= rule.within:
+                continue
             alternate = all(run[0] == runs[i % 2][0] for i, run in enumerate(runs))
             is_one = rule.one_may and all(run[2] for run in runs[1:])
-            long = now - runs[0][1]
-            if len(runs) == rule.runs and alternate and not is_one and PERIOD <= long <= rule.within:
+            if alternate and not is_one:
                 found = rule.what
         return found

@@ -36,7 +36,7 @@ class _Output:
 
     def __init__(self, publisher: Publisher, start: float, rate: float, may_rest: bool) -> None:
         self.publisher = publisher
-        self.rests_until: Callable[[str], float] = getattr(publisher, "rests_until", _never) if may_rest else _never
+        self.rests_until: Callable[[str], float] | None = getattr(publisher, "rests_until", None) if may_rest else None
         self.last = start
         """When the last periodic message was due; it keeps the phase."""
         self.due = _strictly_after(start, rate)
@@ -100,7 +100,9 @@ class IndustrialRobotStatusController:
             self._sent = status, detail
         msg: RobotStatusMsg | None = None
         for output in self._outputs:
-            due = now >= output.due and output.publisher.periodic and now >= output.rests_until(handle.name)
+            due = now >= output.due and output.publisher.periodic
+            if due and output.rests_until is not None:
+                due = now >= output.rests_until(handle.name)
             if not due and not (self._has_changed(output) and self._may_change(output, now)):
                 continue
             if output.publisher.busy():
@@ -141,7 +143,8 @@ class IndustrialRobotStatusController:
             last = None
         for output in self._outputs:
             if output.due < due and output.publisher.periodic:
-                due = min(due, max(output.due, output.rests_until(handle.name)))
+                wanted = output.due if output.rests_until is None else output.rests_until(handle.name)
+                due = min(due, max(output.due, wanted))
             if (output.sent is not last or last is None) and self._has_changed(output):
                 full = len(output.changes) == MOST_CHANGES
                 due = min(due, output.changes[0] + WINDOW if full else now)
@@ -171,11 +174,6 @@ class IndustrialRobotStatusController:
     def _may_change(self, output: _Output, now: float) -> bool:
         changes = output.changes
         return len(changes) < MOST_CHANGES or now >= changes[0] + WINDOW
-
-
-def _never(handle: str) -> float:
-    """A publisher that takes each periodic message."""
-    return -math.inf
 
 
 def _strictly_after(last: float, rate: float) -> float:

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     from .config import ControllerConfig
     from .testing import Scenario, Step
-    from .testing.fake_autopilot import Address
+    from .testing.udp_fake import Address
 
 log = logging.getLogger(__name__)
 

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
-import select
-import socket
 import threading
 from collections import deque
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any
 
-from .. import clock
 from ..clock import Instant
 from ..mavlink.signing import Signer
 from .codec import DecodedMessage, decode
@@ -20,25 +15,20 @@ from .commands import answer
 from .event_table import VehicleFiles
 from .lossy import Lossy, LossyLink
 from .scenario import Action, Scenario, Step, Text, VehicleState, step
+from .udp_fake import Address, UdpFake
 from .vehicle_model import Outgoing, VehicleModel
 
 log = logging.getLogger(__name__)
 
 RECEIVED_KEPT = 1000
 """The most received messages that `heard` returns."""
-READ_AT_ONCE = 100
-"""The most datagrams of one poll: a flood must not prevent the vehicle from sending."""
-POLL_PERIOD = 0.02
-"""Seconds that the thread waits for a datagram before it checks what is due."""
-
-Address = tuple[str, int]
 
 
 def _log_note(step: Step) -> None:
     log.info("%5.1f s  %s", step.at, step.note)
 
 
-class FakeAutopilot:
+class FakeAutopilot(UdpFake):
     """Sends to `to` like an autopilot or a simulator with `--out`, and receives on its own `address`.
 
     Without `to` it waits for the first datagram, and sends to the most recent sender. Either call `poll` with the time,
@@ -66,6 +56,7 @@ class FakeAutopilot:
         files: VehicleFiles | None = None,
         lossy: Lossy | None = None,
     ) -> None:
+        super().__init__(bind)
         self.scenario = scenario
         self._model: VehicleModel | None = None
         self._speed, self._loop, self._on_note = speed, loop, on_note
@@ -79,15 +70,6 @@ class FakeAutopilot:
         self._pending: deque[Step] = deque()
         self._received: deque[DecodedMessage] = deque(maxlen=RECEIVED_KEPT)
         self._lock = threading.Lock()
-        self._stop = threading.Event()
-        self._thread: threading.Thread | None = None
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        try:
-            self._socket.bind(bind)
-        except OSError:
-            self._socket.close()
-            raise
         self.address: Address = self._socket.getsockname()
         """The local address. It receives there."""
 
@@ -166,35 +148,6 @@ class FakeAutopilot:
         for frame in self._sent.carry(frames):
             self._send(frame)
 
-    def close(self) -> None:
-        """Stop the thread, if any, and close the socket."""
-        self._stop.set()
-        if self._thread is not None:
-            self._thread.join()
-        self._socket.close()
-
-    def __enter__(self) -> FakeAutopilot:
-        self._thread = threading.Thread(target=self._run, name="fake autopilot", daemon=True)
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            self.poll(clock.now())
-            select.select([self._socket], [], [], POLL_PERIOD)
-
-    def _receive(self) -> list[tuple[bytes, Address]]:
-        datagrams: list[tuple[bytes, Address]] = []
-        with contextlib.suppress(OSError):  # no datagram waits, or the peer refused an earlier one
-            while len(datagrams) < READ_AT_ONCE:
-                datagrams.append(self._socket.recvfrom(65535))
-        return datagrams
-
     def _handle(self, model: VehicleModel, messages: list[DecodedMessage], sender: Address) -> None:
         if not messages or not model.listening:
             return
@@ -211,10 +164,8 @@ class FakeAutopilot:
         return frame if self._signer is None else self._signer.sign(frame, unix_us)
 
     def _send(self, frame: bytes) -> None:
-        if self._to is None:
-            return
-        with contextlib.suppress(OSError):  # as on a real link, a datagram that cannot be sent is lost
-            self._socket.sendto(frame, self._to)
+        if self._to is not None:
+            self._send_to(self._to, frame)
 
 
 def _is_for(message: DecodedMessage, system: int, component: int) -> bool:

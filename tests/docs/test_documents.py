@@ -224,7 +224,7 @@ def _line_with(lines: Iterable[str], inhibits: list[dict[str, Any]]) -> dict[str
 
 def _ci() -> list[str]:
     """The lines of .ci/run from the set-up on, without indentation."""
-    lines = [line.strip() for line in (ROOT / ".ci" / "run").read_text().splitlines()]
+    lines = [line.strip().split(" || ")[0] for line in (ROOT / ".ci" / "run").read_text().splitlines()]
     return lines[lines.index("python3 -m venv .venv") :]
 
 

@@ -105,6 +105,29 @@ def wake_ups() -> Iterator[Work]:
 
 
 @contextmanager
+def changes() -> Iterator[Work]:
+    """HEARTBEATs that arm and disarm, each with the turn that publishes the change."""
+    with _gateway(lambda: START) as (gateway, send):
+        (source,) = gateway.hardware.all.sources()
+        now = START
+        for i, frame in enumerate(workload.frames(FRAMES)):
+            now = later(START, i / workload.RATE)
+            send(frame)
+            source.receive(now, 1)
+        gateway.turn(now)
+        beats = [workload.heartbeat(armed=i % 2 == 0, sequence=(FRAMES + i) & 255) for i in range(TURNS)]
+
+        def run() -> None:
+            for i, beat in enumerate(beats):
+                at = later(now, (i + 1) * 0.3)
+                send(beat)
+                source.receive(at, 1)
+                gateway.turn(at)
+
+        yield run, TURNS
+
+
+@contextmanager
 def idle_turns() -> Iterator[Work]:
     """Turns of the event loop without work."""
     with _with_vehicle() as (gateway, now):
@@ -138,6 +161,7 @@ COUNTED: Final[dict[str, Callable[[], AbstractContextManager[Work]]]] = {
     "Parser.feed, a datagram: per frame": parse_datagrams,
     "MavlinkRobotHW.take: per frame that is needed": take,
     "EventLoop.run: per turn with a datagram": wake_ups,
+    "EventLoop.turn: with a HEARTBEAT that arms": changes,
     "EventLoop.turn: nothing to do": idle_turns,
     "EventLoop.turn: statuses at 10 Hz": publications,
     "EventLoop.turn: one line of 100 vehicles": fleet_turns,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from collections import Counter
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -16,6 +17,11 @@ TOOL: Final = 4
 
 def count(run: Callable[[], object], without: str = "") -> int:
     """The number of bytecode instructions of a call, without those in functions of the file `without`."""
+    return by_file(run, without).total()
+
+
+def by_file(run: Callable[[], object], without: str = "") -> Counter[str]:
+    """The same for each file whose functions ran."""
     gc.collect()
     gc.disable()  # otherwise finalizers and callbacks run at random times
     try:
@@ -24,12 +30,12 @@ def count(run: Callable[[], object], without: str = "") -> int:
         gc.enable()
 
 
-def _traced(run: Callable[[], object], without: str) -> int:
-    counted = 0
+def _traced(run: Callable[[], object], without: str) -> Counter[str]:
+    counted: Counter[str] = Counter()
 
     def instruction(frame: FrameType, event: str, _: object) -> Any:
-        nonlocal counted
-        counted += event == "opcode"
+        if event == "opcode":
+            counted[frame.f_code.co_filename] += 1
         return instruction
 
     def call(frame: FrameType, event: str, _: object) -> Any:
@@ -47,15 +53,14 @@ def _traced(run: Callable[[], object], without: str) -> int:
     return counted
 
 
-def _monitored(run: Callable[[], object], without: str) -> int:
+def _monitored(run: Callable[[], object], without: str) -> Counter[str]:
     monitoring: Any = sys.monitoring  # type: ignore[attr-defined,unused-ignore]  # of Python 3.12
-    counted = 0
+    counted: Counter[str] = Counter()
 
     def instruction(code: CodeType, _: int) -> Any:
-        nonlocal counted
         if code.co_filename in (without, __file__):
             return monitoring.DISABLE
-        counted += 1
+        counted[code.co_filename] += 1
         return None
 
     event = monitoring.events.INSTRUCTION

@@ -112,6 +112,14 @@ def frames(
     return made
 
 
+def heartbeat(*, armed: bool, sequence: int = 0) -> bytes:
+    """A HEARTBEAT of the vehicle."""
+    mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    mav.seq = sequence
+    fixed = FIXED["heartbeat"] | {"base_mode": 209 if armed else 81, "system_status": 4 if armed else 3}
+    return bytes(dialect.MAVLink_heartbeat_message(**fixed).pack(mav))
+
+
 def fleet(vehicles: int, workload: Workload = QUARTER, *, in_step: bool = False) -> list[bytes]:
     """A loop of frames of many vehicles in turn; for one vehicle the frames of `frames`.
 

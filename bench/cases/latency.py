@@ -12,8 +12,6 @@ from functools import partial
 from statistics import median, quantiles
 from typing import TYPE_CHECKING, Any
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from .. import workload
 from ..case import Bench, Case, Found
 from ..contenders import FILTERED, LOOP, NO_FILTER
@@ -85,13 +83,7 @@ class _Vehicle:
         self._gap = 1 / rate if rate else float("inf")
         self._due = time.perf_counter() + self._gap
         self._sequence = 0
-        mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
-        self._heartbeats = {
-            arm: bytes(
-                dialect.MAVLink_heartbeat_message(10, 3, 209 if arm else 81, 0, 4 if arm else 3, 3).pack(mav)
-            )
-            for arm in (False, True)
-        }  # fmt: skip
+        self._heartbeats = {arm: workload.heartbeat(armed=arm) for arm in (False, True)}
         others = workload.frames(workload.SHORT_LOOP, workload=workload.HALF) if rate else []
         self._others = itertools.cycle(
             frame for frame in others if int.from_bytes(frame[7:10], "little") != HEARTBEAT

@@ -10,6 +10,7 @@ import pytest
 
 from bench.guard import COUNTED, THIS_PYTHON, Verdict, baselines, compare
 
+from ...deadline import allow
 from ...docs.documents import ROOT
 
 
@@ -18,8 +19,8 @@ def test_no_call_needs_more_instructions_than_its_baseline() -> None:
         pytest.skip(f"no baseline for Python {THIS_PYTHON}; python -m bench.guard --update writes one")
     # in a separate process: the caches of other tests do not change the count
     done = subprocess.run(
-        [sys.executable, "-m", "bench.guard"], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
-        env={**os.environ, "PYTHONHASHSEED": "0"},
+        [sys.executable, "-m", "bench.guard"], cwd=ROOT, capture_output=True, text=True, timeout=allow(120),
+        check=False, env={**os.environ, "PYTHONHASHSEED": "0"},
     )  # fmt: skip
     assert done.returncode == 0, f"{done.stdout}{done.stderr}\nintended? python -m bench.guard --update"
     assert all(name in done.stdout for name in COUNTED)

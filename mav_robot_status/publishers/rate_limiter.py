@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 MOST_CHANGES: Final = 5
 WINDOW: Final = 1.0  # s
 SLACK: Final = 0.01  # s: a message this much early still counts as periodic
+LONGEST_REST: Final = 1.0  # s: no audience that is new, or asks for one status, gets an older one
 
 S = TypeVar("S")
 
@@ -187,7 +188,7 @@ class RateLimitedPublisher(ABC, Generic[S]):
             if state is None:
                 state = states[handle] = self.state_type()
             due = min(due, self.send_due(msg, msg.detail.system, audience, state, now))
-            rests = min(rests, self.next_periodic(audience, state) - SLACK)
+            rests = min(rests, self.next_periodic(audience, state) - SLACK, now + LONGEST_REST)
         if rests < math.inf and due == math.inf:
             self._rests[handle] = rests
         else:

@@ -225,6 +225,12 @@ def test_it_rests_until_the_first_audience_is_due(publisher: MavlinkPublisher, p
     assert publisher.rests_until("other") == -math.inf
 
 
+def test_it_rests_for_a_second_at_most(publisher: MavlinkPublisher, port: Port) -> None:
+    port.present = [STATION._replace(interval=60.0)]
+    publish(publisher, 0.0, msg())
+    assert publisher.rests_until("robot") == 1.0
+
+
 def test_it_does_not_rest_while_a_change_waits(publisher: MavlinkPublisher) -> None:
     for number in range(7):
         publish(publisher, number * 0.01, failing(number))

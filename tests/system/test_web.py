@@ -243,7 +243,7 @@ def test_two_hundred_clients_half_of_them_dead_cost_no_latency_and_no_memory(
 
 def test_without_the_extra_the_option_is_a_usage_error() -> None:
     script = (
-        "import sys; sys.modules['aiohttp'] = None\n"
+        "import sys; sys.modules['tornado'] = None\n"
         "from mav_robot_status.cli import main\n"
         "sys.exit(main(sys.argv[1:]))\n"
     )

@@ -11,7 +11,7 @@ from mav_robot_status import __version__
 from mav_robot_status.cli import main
 from mav_robot_status.commands import COMMANDS
 
-LATER = {"yaml", "aiohttp", "paho", "textual", "serial", "pymavlink"}
+LATER = {"yaml", "tornado", "paho", "textual", "serial", "pymavlink"}
 """Modules that a run imports only for an option that needs them."""
 RARE = {
     "asyncio",

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Final
 
-from aiohttp import web
-
 from ..metrics import CONTENT_TYPE, exposition
+from .handler import Response
 
 if TYPE_CHECKING:
     from ...interface import Metrics
+    from .handler import Handler
 
 PATIENCE: Final = 5.0
 """Seconds to wait. The event loop runs at least once a second."""
@@ -24,7 +24,7 @@ class Scrapes:
         """Whether a request waits. The gateway's thread clears it before it reads the values."""
         self._waiting: set[asyncio.Future[Metrics]] = set()
 
-    async def answer(self, request: web.Request) -> web.Response:
+    async def answer(self, handler: Handler) -> Response:
         """Answer one request. 503 if the gateway is stalled: a missing series is better than a frozen one."""
         future: asyncio.Future[Metrics] = asyncio.get_running_loop().create_future()
         self._waiting.add(future)
@@ -32,10 +32,10 @@ class Scrapes:
         try:
             metrics = await asyncio.wait_for(future, PATIENCE)
         except asyncio.TimeoutError:
-            return web.Response(status=503, text="The gateway is stalled.\n")
+            return Response(b"The gateway is stalled.\n", status=503)
         finally:
             self._waiting.discard(future)
-        return web.Response(body=exposition(metrics).encode(), headers={"Content-Type": CONTENT_TYPE})
+        return Response(exposition(metrics).encode(), CONTENT_TYPE)
 
     def give(self, metrics: Metrics) -> None:
         """Answer all waiting requests."""

@@ -5,20 +5,22 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import math
 import mimetypes
+import re
 import threading
 from hashlib import sha256
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
-from aiohttp import web
+from tornado.iostream import StreamClosedError
 
 from ...clock import now as present
 from ...language import style_sheet
 from ...version import __version__
-from .access_control import AccessControl, add_headers
+from .access_control import AccessControl
+from .connections import Connections
 from .events import PULSE, Events, Listener
+from .handler import Handler, Pages, Response, as_json
 from .help_page import help_page
 from .looks import fields_module
 from .scrape import Scrapes
@@ -30,15 +32,12 @@ if TYPE_CHECKING:
     from ...clock import Instant
     from ...interface import Metrics
     from ..board import Board, Entry
+    from .handler import Answer
 
 log = logging.getLogger(__name__)
-quiet = logging.getLogger(f"{__name__}.http")
-quiet.setLevel(logging.CRITICAL)  # aiohttp logs each request that is not HTTP
 
 STANDING: Final = 5.0
 """Seconds without a round of the event loop after which the board's source counts as stalled."""
-LOG_PERIOD: Final = 60.0  # s between two log lines about connections that cannot be accepted
-KEEP_ALIVE: Final = 15.0  # s
 CLOSING: Final = 2.0  # s to wait for the thread to end
 SCHEMA: Final = "robot_status.schema.json"
 GENERATED: Final = {"fields.js": fields_module, "tones.css": lambda: style_sheet().encode(), "help.html": help_page}
@@ -65,11 +64,11 @@ class WebServer:
         self.turned: float | None = None
         """When (monotonic seconds) the event loop of the source last ran; None: not checked. Any thread may set it."""
         self._posted = False
-        self._log_at = -math.inf
         self._ready = threading.Event()
         self._loop: asyncio.AbstractEventLoop
         self._events: Events
-        self._access = AccessControl(options, lambda: clock().mono)
+        self._connections: Connections
+        self._access = AccessControl(options)
         self._thread = threading.Thread(target=self._run, name="http", daemon=True)
 
     @property
@@ -124,94 +123,72 @@ class WebServer:
         self._loop.set_exception_handler(self._failed)
         self._stop = asyncio.Event()
         self._events = Events(self.board, self._clock, self.standing, self._stale_after, self._alarm)
-        app = web.Application(middlewares=[self._access.middleware()])
-        app.on_response_prepare.append(add_headers)
-        self._add_routes(app)
-        runner = web.AppRunner(
-            app, access_log=None, logger=quiet, keepalive_timeout=KEEP_ALIVE, shutdown_timeout=0.1, handle_signals=False
-        )
-        await runner.setup()
-        assert runner.server is not None
-        self._access.set_server(runner.server)
-        server = await self._loop.create_server(self._access, sock=self._socket)
+        pages = Pages(self._answers(), self._access.refusal, lambda request: self._connections.heard(request))
+        self._connections = Connections(self._socket, self.url, pages, lambda: self._clock().mono)
+        self._connections.listen()
         self._ready.set()
         try:
             while not self._stop.is_set():
                 self._events.pulse()
-                self._access.close_silent()
+                self._connections.close_silent()
                 with contextlib.suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(self._stop.wait(), PULSE)
         finally:
-            server.close()
-            for listener in self._events.listeners:
-                listener.abort()
-            await runner.cleanup()
+            self._connections.close()
 
     def _failed(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Log a failure of the event loop. It reports each failed `accept` with a traceback, a hundred a second."""
-        error = context.get("exception")
-        if not isinstance(error, OSError):
+        """Log a failure of the event loop. The end of a connection is not one, nor is a request cut off at the end."""
+        if not isinstance(context.get("exception"), (OSError, asyncio.CancelledError)):
             loop.default_exception_handler(context)
-            return
-        now = self._clock().mono
-        if now >= self._log_at:
-            self._log_at = now + LOG_PERIOD
-            log.warning("%s: cannot accept another browser: %s", self.url, (error.strerror or str(error)).lower())
 
-    def _add_routes(self, app: web.Application) -> None:
-        for name, body in _assets().items():
-            app.router.add_get("/" if name == "index.html" else f"/{name}", _asset(name, body))
-        for name, made in GENERATED.items():
-            app.router.add_get(f"/{name}", _asset(name, made()))
-        app.router.add_get(
-            "/schema.json", _asset(SCHEMA, files("mav_robot_status").joinpath(f"data/{SCHEMA}").read_bytes())
-        )
-        app.router.add_get("/healthz", self._healthz)
-        app.router.add_get("/readyz", self._readyz)
-        app.router.add_get("/events", self._stream)
+    def _answers(self) -> dict[str, Answer]:
+        bodies = {name: (name, body) for name, body in _assets().items()}
+        bodies.update((name, (name, made())) for name, made in GENERATED.items())
+        bodies[""] = bodies.pop("index.html")
+        bodies["schema.json"] = SCHEMA, files("mav_robot_status").joinpath(f"data/{SCHEMA}").read_bytes()
+        answers = {re.escape(f"/{path}"): _asset(*body) for path, body in bodies.items()}
+        answers["/healthz"] = self._healthz
+        answers["/readyz"] = self._readyz
+        answers["/events"] = self._stream
         if self._scrapes is not None:
-            app.router.add_get("/metrics", self._scrapes.answer)
-        app.router.add_get("/api/v1/vehicles", self._vehicles)
-        app.router.add_get("/api/v1/vehicles/{which:.+}", self._vehicle)
+            answers["/metrics"] = self._scrapes.answer
+        answers["/api/v1/vehicles"] = self._vehicles
+        answers["/api/v1/vehicles/(.+)"] = self._vehicle
+        return answers
 
-    async def _healthz(self, request: web.Request) -> web.Response:
-        return web.json_response({"ok": True, "version": __version__})
+    async def _healthz(self, handler: Handler) -> Response:
+        return as_json({"ok": True, "version": __version__})
 
-    async def _readyz(self, request: web.Request) -> web.Response:
+    async def _readyz(self, handler: Handler) -> Response:
         standing = self.standing()
         body = {"ready": standing is None, "standing": standing, "vehicles": len(self.board.entries)}
-        return web.json_response(body, status=200 if standing is None else 503)
+        return as_json(body, status=200 if standing is None else 503)
 
-    async def _vehicles(self, request: web.Request) -> web.Response:
-        return web.json_response([entry.whole() for entry in self.board])
+    async def _vehicles(self, handler: Handler) -> Response:
+        return as_json([entry.whole() for entry in self.board])
 
-    async def _vehicle(self, request: web.Request) -> web.Response:
-        entry = find(self.board, request.match_info["which"])
+    async def _vehicle(self, handler: Handler) -> Response:
+        entry = find(self.board, handler.path_args[0])
         if entry is None:
-            return web.json_response({"error": "no such vehicle; /api/v1/vehicles lists them"}, status=404)
-        return web.json_response(entry.whole())
+            return as_json({"error": "no such vehicle; /api/v1/vehicles lists them"}, status=404)
+        return as_json(entry.whole())
 
-    async def _stream(self, request: web.Request) -> web.StreamResponse:
-        def abort() -> None:
-            if request.transport is not None:
-                request.transport.abort()
-
-        listener = Listener(request.query.get("handle"), abort)
+    async def _stream(self, handler: Handler) -> Response | None:
+        listener = Listener(handler.query("handle"), handler.abort)
         if not self._events.enter(listener):
-            return web.Response(status=503, text="Too many clients.\n", headers={"Retry-After": "10"})
-        response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "X-Accel-Buffering": "no"})
+            return Response(b"Too many clients.\n", status=503, headers={"Retry-After": "10"})
         try:
-            with contextlib.suppress(ConnectionError):
-                await response.prepare(request)
-                while not self._stop.is_set():
+            with contextlib.suppress(StreamClosedError):
+                await handler.begin("text/event-stream", {"X-Accel-Buffering": "no"})
+                while not self._stop.is_set() and handler.request.method != "HEAD":
                     if data := self._events.since(listener):
                         listener.busy_since = self._clock().mono
-                        await response.write(data)
+                        await handler.add(data)
                         listener.busy_since = None
                     await self._events.wait()
         finally:
             self._events.leave(listener)
-        return response
+        return None
 
 
 def serve(board: Board, options: WebSettings, scrapes: Scrapes | None = None) -> WebServer:
@@ -235,15 +212,14 @@ def _assets() -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
 
 
-def _asset(name: str, body: bytes) -> Callable[[web.Request], Any]:
+def _asset(name: str, body: bytes) -> Answer:
     kind = "text/javascript" if name.endswith(".js") else mimetypes.guess_type(name)[0] or "application/octet-stream"
-    tag = f'"{sha256(body).hexdigest()[:16]}"'
+    kind += "; charset=utf-8" if kind.startswith("text/") else ""
+    headers = {"ETag": f'"{sha256(body).hexdigest()[:16]}"', "Cache-Control": "no-cache"}
 
-    async def answer(request: web.Request) -> web.Response:
-        headers = {"ETag": tag, "Cache-Control": "no-cache"}
-        if request.headers.get("If-None-Match") == tag:
-            return web.Response(status=304, headers=headers)
-        charset = "utf-8" if kind.startswith("text/") else None
-        return web.Response(body=body, content_type=kind, charset=charset, headers=headers)
+    async def answer(handler: Handler) -> Response:
+        if handler.request.headers.get("If-None-Match") == headers["ETag"]:
+            return Response(status=304, headers=headers)
+        return Response(body, kind, headers=headers)
 
     return answer

@@ -113,8 +113,10 @@ def test_each_round_explains_one_of_the_shown_vehicles_in_turn() -> None:
 
 
 def test_without_the_extra_the_error_names_the_package_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "aiohttp", None)
-    for name in ("serve", "door"):
-        monkeypatch.delitem(sys.modules, f"mav_robot_status.publishers.web.{name}", raising=False)
+    package = "mav_robot_status.publishers.web."
+    needing = {package + name for name in ("access_control", "connections", "handler", "scrape", "serve")}
+    for name in [name for name in sys.modules if name in needing or name.startswith("tornado.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "tornado", None)
     with pytest.raises(UsageError, match=r"pip install 'mav-robot-status\[web\]'"), publishing():
         pass

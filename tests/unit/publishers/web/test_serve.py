@@ -126,6 +126,15 @@ def test_a_change_is_sent_as_an_event() -> None:
         until(lambda: not site.server._events.listeners)
 
 
+def test_the_head_of_the_stream_has_an_end() -> None:
+    with Site() as site:
+        asked = site.ask("/events", "HEAD")
+        assert (asked.status, asked.headers["Content-Type"], asked.body) == (200, "text/event-stream", b"")
+        assert asked.headers["X-Accel-Buffering"] == "no"
+        assert asked.headers["Content-Length"] is None
+        until(lambda: not site.server._events.listeners)
+
+
 def test_a_listener_beyond_the_limit_gets_503_with_retry_after(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(events, "MOST_LISTENERS", 1)
     with Site() as site:

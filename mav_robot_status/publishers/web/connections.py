@@ -70,7 +70,7 @@ class Connections(HTTPServerConnectionDelegate):
         """Close the port and all connections."""
         self._loop.remove_reader(self._socket)
         self._socket.close()
-        for connection in self.open:
+        for connection in list(self.open):
             connection.stream.close()
 
     def heard(self, request: HTTPServerRequest) -> None:

@@ -32,7 +32,8 @@ def answer_to(site: Site, *parts: bytes, end: bool = True) -> bytes:
         with contextlib.suppress(ConnectionError):
             for part in parts:
                 stranger.sendall(part)
-            if end:
+        if end:
+            with contextlib.suppress(OSError):  # the server has closed it
                 stranger.shutdown(socket.SHUT_WR)
         with contextlib.suppress(ConnectionError):
             while data := stranger.recv(1 << 16):

@@ -179,7 +179,7 @@ class RateLimitedPublisher(ABC, Generic[S]):
         msg = self._latest.get(handle)
         if msg is None or msg.detail.system is None:
             return math.inf
-        due = rests = math.inf
+        due, rests = math.inf, now + LONGEST_REST
         for audience in self._audiences:
             if audience.systems is not None and msg.detail.system not in audience.systems:
                 continue
@@ -188,8 +188,8 @@ class RateLimitedPublisher(ABC, Generic[S]):
             if state is None:
                 state = states[handle] = self.state_type()
             due = min(due, self.send_due(msg, msg.detail.system, audience, state, now))
-            rests = min(rests, self.next_periodic(audience, state) - SLACK, now + LONGEST_REST)
-        if rests < math.inf and due == math.inf:
+            rests = min(rests, self.next_periodic(audience, state) - SLACK)
+        if due == math.inf:
             self._rests[handle] = rests
         else:
             self._rests.pop(handle, None)

@@ -231,6 +231,13 @@ def test_it_rests_for_a_second_at_most(publisher: MavlinkPublisher, port: Port) 
     assert publisher.rests_until("robot") == 1.0
 
 
+def test_it_rests_while_no_audience_gets_this_vehicle(publisher: MavlinkPublisher, port: Port) -> None:
+    port.present = [STATION._replace(systems=frozenset({9}))]
+    publish(publisher, 0.0, msg())
+    assert publisher.rests_until("robot") == 1.0
+    assert not port.sent
+
+
 def test_it_does_not_rest_while_a_change_waits(publisher: MavlinkPublisher) -> None:
     for number in range(7):
         publish(publisher, number * 0.01, failing(number))

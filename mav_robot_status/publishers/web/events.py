@@ -70,7 +70,8 @@ class Events:
         self._version, self._turn, self._ticked = -1, 0, 0.0
         self._fresh = False
         """Whether there is a new explanation."""
-        self._cache: dict[tuple[int, int], bytes] = {}
+        self._cache: dict[tuple[int, int, int, int], bytes] = {}
+        """Events that several listeners get: what they have, and what the board has. Emptied in each pulse."""
         self.listeners: set[Listener] = set()
         self.dropped = 0
         """Listeners that were disconnected."""
@@ -124,9 +125,10 @@ class Events:
         board = self._board
         parts = []
         if listener.sent_version != board.version or listener.turn != self._turn:
-            key = (listener.sent_version, listener.turn)
+            # the board may change between two listeners that come in one pulse
+            key = (listener.sent_version, listener.turn, board.version, self._turn)
             if key not in self._cache:
-                self._cache[key] = self._change(*key)
+                self._cache[key] = self._change(listener.sent_version, listener.turn)
             parts.append(self._cache[key])
             listener.sent_version, listener.turn = board.version, self._turn
         entry = board.entries.get(listener.handle) if listener.handle is not None else None

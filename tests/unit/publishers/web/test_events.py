@@ -64,6 +64,18 @@ def test_a_new_listener_gets_the_whole_board_and_then_changes(stage: Stage) -> N
     assert (name, [line["handle"] for line in data["vehicles"]]) == ("change", ["b"])
 
 
+def test_a_listener_gets_a_change_that_came_after_another_listener_of_the_same_pulse(stage: Stage) -> None:
+    stage.take(MANUAL)
+    stage.events.pulse()
+    stage.received(stage.listener())
+    stage.take(AUTO)
+    late = stage.listener()
+    [(name, data)] = stage.received(late)
+    assert (name, data["vehicles"][0]["mode"]) == ("board", "AUTO")
+    stage.events.pulse()
+    assert [line for name, data in stage.received(late) for line in data["vehicles"]] == []
+
+
 def test_each_line_comes_with_its_headline_and_none_is_made_while_nobody_listens(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -157,7 +157,7 @@ def _play(story: Story, stdout: TextIO, live: bool) -> None:
 
 
 def _show(story: Story) -> None:
-    """The plain table: whoever has just installed this has it, and it needs no keys."""
+    """The plain table. It needs no extra and no keys."""
     told: list[str] = [""]
 
     def note(system: int, step: Step) -> None:

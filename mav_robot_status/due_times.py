@@ -1,4 +1,4 @@
-"""When each of many things is due, in order: who wants the first one does not look at all."""
+"""When each of many things is due, in order. The first is found without a search."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ OnNote = Callable[[int, Step], None]
 
 
 class FakeFleet(UdpFake):
-    """Vehicles with the system ids 1, 2, ... that send to every address of `to`, and hear whoever sends to them.
+    """Vehicles with the system ids 1, 2, ... that send to every address of `to`, and hear every sender.
 
     Either call `poll` with the time, or let a thread run on the real clock: `with FakeFleet(...):`. `on_note` is called
     with the system id and each step, in the thread if one runs. `loop` restarts each scenario at its end, `speed` makes

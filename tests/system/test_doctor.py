@@ -97,7 +97,7 @@ class Terminal:
         os.write(self.master, data)
 
     def baud(self) -> int:
-        """The rate that whoever has the device open has set."""
+        """The rate that the program with the open device has set."""
         return {getattr(termios, f"B{b}"): b for b in (38400, 57600, 115200)}.get(termios.tcgetattr(self.master)[5], 0)
 
     def close(self) -> None:

@@ -32,7 +32,7 @@ class Wire:
     """The heartbeats of an ArduPilot rover; `beating` sends them from a thread."""
 
     def __init__(self, to: tuple[Any, ...] | None = None, system: int = 1, component: int = 1) -> None:
-        """Without `to` it sends to whoever sends to it first."""
+        """Without `to` it sends to the first sender that it hears."""
         self.socket = socket.socket(socket.AF_INET6 if to and ":" in to[0] else socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("::1" if to and ":" in to[0] else "127.0.0.1", 0))
         self.socket.settimeout(0.05)

@@ -36,7 +36,7 @@ class Once(NamedTuple):
     older: int | None = None
     """The command, with 1 as its first parameter, for firmware that does not know MAV_CMD_REQUEST_MESSAGE."""
     again: bool = False
-    """Whether it is requested again if the autopilot accepts the command and the message does not arrive."""
+    """Whether it is requested again until the message arrives or the autopilot refuses a second time."""
 
 
 VERSION: Final = Once(

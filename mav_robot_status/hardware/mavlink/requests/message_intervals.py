@@ -79,7 +79,7 @@ class _Command:
         self.older = older
         """The command to send if this one is not supported."""
         self.again = again
-        """Whether an acknowledgement does not end it, but only the message that it asks for."""
+        """Whether it ends with the message that it asks for, and with no acknowledgement but a second refusal."""
         self.tries = 0
         self.due = -math.inf
 
@@ -193,7 +193,8 @@ class Requests:
         if (ack.target_system or ack.target_component) and (ack.target_system, ack.target_component) != own:
             return
         again = ack.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED and command.tries <= RETRIES
-        again = again or (ack.result == mavlink.MAV_RESULT_ACCEPTED and command.again)
+        # a refusal after the first try may be a late or repeated one, of the request before
+        again = again or (command.again and (ack.result == mavlink.MAV_RESULT_ACCEPTED or command.tries == 1))
         if again or ack.result == mavlink.MAV_RESULT_IN_PROGRESS:
             command.due = now + PROGRESS
         elif command.command == MAV_CMD_GET_MESSAGE_INTERVAL:

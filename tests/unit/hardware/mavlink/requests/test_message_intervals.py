@@ -341,6 +341,20 @@ def test_version_modes_and_metadata_are_requested_once(requests: Requests) -> No
     ]
 
 
+def test_only_a_second_refusal_ends_the_request_for_metadata(requests: Requests) -> None:
+    refused = ack(MAV_RESULT_UNSUPPORTED, MAV_CMD_REQUEST_MESSAGE)  # the first one may be that of another request
+    times = []
+    for tick in range(200):
+        now = 103.0 + tick / 10
+        command = requests.due(now, (), PX4)
+        if isinstance(command, CommandLong) and command.param1 == METADATA.id:
+            times.append(now)
+            requests.acknowledged(refused, US, now)
+        elif command is not None:
+            requests.acknowledged(ack(command=MAV_CMD_REQUEST_MESSAGE), US, now)
+    assert len(times) == 2
+
+
 def test_metadata_that_is_lost_after_its_acknowledgement_is_requested_again(requests: Requests) -> None:
     accepted = ack(command=MAV_CMD_REQUEST_MESSAGE)
     times = []

@@ -86,7 +86,7 @@ class Source:
         return self._clock.now()
 
     def wait(self, seconds: float) -> bool:
-        """It goes on."""
+        """It continues."""
         return False
 
     def rows(self) -> list[Row]:

@@ -17,7 +17,7 @@ class Instant(NamedTuple):
     """One moment on two clocks."""
 
     mono: float
-    """Seconds on a clock that never steps, and that goes on while the system is suspended. All durations use it."""
+    """Seconds on a clock that never steps, and that continues while the system is suspended. All durations use it."""
     unix_us: int
     """Microseconds since 1970 in UTC. Only time stamps use it."""
 

@@ -40,7 +40,7 @@ class AutopilotClock:
     """Dates frames by the clock of the first autopilot that sends a heartbeat.
 
     A frame without a time has the time before it. Without UTC the time is that since the start of the autopilot. After
-    a restart of the autopilot time goes on where it was.
+    a restart of the autopilot, time continues from where it was.
     """
 
     def __init__(self, head: bytes) -> None:

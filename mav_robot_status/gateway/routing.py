@@ -9,7 +9,7 @@ The rules are those of https://mavlink.io/en/guide/routing.html. Where they leav
 * A broadcast does not go to a channel from which its sender still comes: receivers there already have it
   (mavlink-router, accept_msg). "Still" means PRESENT seconds since its last frame there, and for a heartbeat
   BEAT_PRESENT seconds since its last heartbeat there. An autopilot passes the heartbeat of a ground station on to us.
-  When the station then changes its way and comes through us alone, the autopilot must have its heartbeats within two
+  When the station then moves and comes through us alone, the autopilot must have its heartbeats within two
   seconds: they keep its failsafe away.
 * A frame for one system is never held back for that reason. A command that arrives twice is better than one that is
   lost.

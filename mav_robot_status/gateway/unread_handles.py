@@ -1,4 +1,4 @@
-"""Tells once that a vehicle is heard whose handle no controller of the configuration reads."""
+"""Warns once of a heard vehicle whose handle no controller of the configuration reads."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class Rule(NamedTuple):
 
 
 RULES: Final[dict[str, Rule]] = {
-    "mode": Rule(Logic.ANY),  # a person has a part of it in hand
+    "mode": Rule(Logic.ANY),  # a person commands a part of it
     "e_stopped": Rule(Logic.ANY),  # something is stopped and must be released
     "drives_powered": Rule(Logic.ANY),  # a hazard while any part is powered
     "motion_possible": Rule(Logic.ALL),  # the robot as a whole can do its work
@@ -161,7 +161,7 @@ def _field(group: Group, field: str, members: Sequence[Member]) -> tuple[TriStat
     value = kleene(logic, [_value(member, field) for member in asked])
     deciding = [member for member in asked if _value(member, field) is value]
     if not deciding:
-        return value, Evidence("the group has no member that tells")
+        return value, Evidence("no member of the group knows")
     first = deciding[0]
     why = first.evidence.get(field)
     others = f", and {len(deciding) - 1} more" if len(deciding) > 1 else ""

@@ -73,7 +73,7 @@ def _errors(status: RobotStatus, frame: StatusFrame, before: Detail, unix_us: in
 
 
 def _inhibits(status: RobotStatus, before: Detail, unix_us: int) -> tuple[Inhibit, ...]:
-    """What the frame tells of the reasons. A controller may have others, which it has no field for."""
+    """The reasons in the frame. A controller may have others, for which the frame has no field."""
     if status.motion_possible is not FALSE:
         return ()
     named = {

@@ -84,7 +84,7 @@ def test_a_rule_of_a_member_that_is_not_there_is_unknown() -> None:
     group = Group("robot", rules={"in_motion": Rule(Logic.ANY, of="z")})
     found = of(RobotStatus(in_motion=TRUE), group=group)
     assert found.status.in_motion is UNKNOWN
-    assert found.evidence["in_motion"].rule == "the group has no member that tells"
+    assert found.evidence["in_motion"].rule == "no member of the group knows"
 
 
 def test_a_group_without_members_knows_nothing() -> None:

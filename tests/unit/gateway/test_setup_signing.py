@@ -67,6 +67,13 @@ def test_setup_signing_is_not_forwarded_in_either_direction(forwarding: Forwardi
     assert forwarding.forward(key, forwarding.vehicle) == []
 
 
+@pytest.mark.parametrize("key", [SETUP_SIGNING, TO_ALL], ids=["to one vehicle", "to all"])
+def test_setup_signing_of_a_known_sender_is_not_forwarded(forwarding: Forwarding, key: bytes) -> None:
+    assert forwarding.forward(COMMAND, forwarding.ground) == [COMMAND]  # its address has a channel now
+    assert forwarding.forward(key, forwarding.ground) == []
+    assert forwarding.forward(COMMAND, forwarding.ground) == [COMMAND]
+
+
 def test_other_frames_of_the_same_datagram_are_forwarded(forwarding: Forwarding) -> None:
     assert forwarding.forward(COMMAND, forwarding.ground) == [COMMAND]
     other = encode(CommandLong(0, 0, 0, 0, 0, 0, 0, 401, 0, 0, 0), system=255, component=190, sequence=3)

@@ -28,6 +28,9 @@ def describe(config: Config) -> list[str]:
         f"requests: {_REQUESTS[config.requests]}",
         *([f"signing: {_signing(config.signing)}"] if config.signing else []),
         *([f"coalesce: input gathers for {config.coalesce * 1000:g} ms before it is read"] if config.coalesce else []),
+        *([f"max_gap: {_GAP % config.max_gap}"] if config.max_gap != Config().max_gap else []),
+        *(["forward: every frame between the links and the outs"] if config.forward else []),
+        *([f"record: everything received and sent, to {config.record}"] if config.record else []),
         *(f"controller {controller.name}: {_controller(controller)}" for controller in config.controllers),
         *([] if config.controllers else ["controller: the default one for each handle"]),
     ]
@@ -35,21 +38,30 @@ def describe(config: Config) -> list[str]:
 
 _EVERY_VEHICLE = "vehicle: every autopilot that is heard, each with a handle of its own"
 _REQUESTS = {
-    "missing": "messages that are needed and do not come are asked for",
-    "none": "nothing is asked of the autopilot",
+    "missing": "messages that a status needs and that do not arrive",
+    "none": "nothing is requested from the autopilot",
 }
 _UNSIGNED = {
-    "none": "nothing is taken unsigned",
-    "radio_status": "nothing but RADIO_STATUS is taken unsigned",
-    "all": "everything is taken unsigned too, so nothing that comes in is protected",
+    "none": "nothing is accepted unsigned",
+    "radio_status": "nothing but RADIO_STATUS is accepted unsigned",
+    "all": "everything is accepted unsigned, so nothing received is protected",
 }
+_GAP = "a longer silence of a log than %g s, after the link is lost, gives one line"
+_ROBOT_STATUS = {None: (), True: ("ROBOT_STATUS is sent there",), False: ("ROBOT_STATUS is not sent there",)}
 
 
 def _link(link: LinkConfig) -> str:
-    timeout = link.heartbeat_timeout
-    notes = (["passive: nothing is sent there"] if link.passive else []) + (
-        [] if timeout is None else [f"a vehicle there is lost after {timeout:g} s without a heartbeat"]
-    )
+    timeout, limit = link.heartbeat_timeout, link.speech_limit
+    notes = [
+        *(["passive: nothing is sent there"] if link.passive else []),
+        *_ROBOT_STATUS[link.robot_status],
+        *(
+            []
+            if limit is None
+            else [f"at most {limit:g} B/s are sent unasked" if limit else "no limit on what is sent"]
+        ),
+        *([] if timeout is None else [f"a vehicle there is lost after {timeout:g} s without a heartbeat"]),
+    ]
     return url.parse(link.url).words() + (f" ({'; '.join(notes)})" if notes else "")
 
 

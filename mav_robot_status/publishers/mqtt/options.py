@@ -22,7 +22,7 @@ class BrokerOptions(Options):
     user: Annotated[str | None, Option("user name at the broker", "--mqtt-user", "NAME")] = None
     password_file: Annotated[
         str | None,
-        Option("password file, unless MAV_ROBOT_STATUS_MQTT_PASSWORD is set", "--mqtt-password-file", "FILE"),
+        Option("file with the password; without it, MAV_ROBOT_STATUS_MQTT_PASSWORD", "--mqtt-password-file", "FILE"),
     ] = None
     ca: Annotated[str | None, Option("trusted CA (PEM), instead of the system's", "--mqtt-ca", "FILE")] = None
     cert: Annotated[str | None, Option("client certificate (PEM)", "--mqtt-cert", "FILE")] = None

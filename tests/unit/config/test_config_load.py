@@ -223,9 +223,9 @@ def test_the_values_for_unsigned_frames_equal_those_of_the_verifier() -> None:
 @pytest.mark.parametrize(
     ("accept", "words"),
     [
-        ("none", "nothing is taken unsigned"),
-        ("radio_status", "nothing but RADIO_STATUS is taken unsigned"),
-        ("all", "everything is taken unsigned too, so nothing that comes in is protected"),
+        ("none", "nothing is accepted unsigned"),
+        ("radio_status", "nothing but RADIO_STATUS is accepted unsigned"),
+        ("all", "everything is accepted unsigned, so nothing received is protected"),
     ],
 )
 def test_signing_is_described(tmp_path: Path, accept: str, words: str) -> None:
@@ -279,7 +279,7 @@ three: {type: theirs/Controller, colour: red}
         "hardware: v_on = 0.4 (default 0.3)",
         "hardware: mode_overrides = copter: {77: AUTO} (default none)",
         "hardware: ignore_sensors = AHRS, GPS (default none)",
-        "requests: nothing is asked of the autopilot",
+        "requests: nothing is requested from the autopilot",
         "coalesce: input gathers for 10 ms before it is read",
         "controller one: handle 'a' at 10 Hz and on change to json, mavlink",
         "controller two: handle 'b' never to the default publisher",
@@ -287,12 +287,34 @@ three: {type: theirs/Controller, colour: red}
     ]
 
 
+def test_what_passes_through_and_what_is_sent_on_a_link_is_described(tmp_path: Path) -> None:
+    text = """\
+links:
+  - {url: "udp:14550", robot_status: false, speech_limit: 500, heartbeat_timeout: 5 s}
+  - {url: "udp:14551", robot_status: true, speech_limit: 0}
+  - {url: "udp:14552", passive: true}
+forward: true
+record: flight.tlog
+max_gap: 10 s
+"""
+    lines = describe(loaded(tmp_path, text))
+    assert [line.partition(" (")[2] for line in lines if line.startswith("link: ")] == [
+        "ROBOT_STATUS is not sent there; at most 500 B/s are sent unasked; "
+        "a vehicle there is lost after 5 s without a heartbeat)",
+        "ROBOT_STATUS is sent there; no limit on what is sent)",
+        "passive: nothing is sent there)",
+    ]
+    assert "forward: every frame between the links and the outs" in lines
+    assert "record: everything received and sent, to flight.tlog" in lines
+    assert "max_gap: a longer silence of a log than 10 s, after the link is lost, gives one line" in lines
+
+
 def test_an_empty_configuration_is_described_by_the_defaults() -> None:
     assert describe(Config()) == [
         "link: none in the file; give one on the command line",
         "vehicle: every autopilot that is heard, each with a handle of its own",
         "identity: the vehicle's own system, component 192, with a HEARTBEAT of its own",
-        "requests: messages that are needed and do not come are asked for",
+        "requests: messages that a status needs and that do not arrive",
         "controller: the default one for each handle",
     ]
 

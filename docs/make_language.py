@@ -67,7 +67,7 @@ def headlines() -> Iterator[str]:
     )
     yield "*Not ready* and *partly stopped* are said of groups: another member may move.\n"
     yield "A lost link is never a reason why motion is not possible. It says that nothing is known, since when, and"
-    yield "what was last known: “Nothing is known since 14:03:10. It may be moving. Last known: AUTO, moving.”"
+    yield "what was last known: “Unknown since 14:03:10. It may be moving. Last known: AUTO, moving.”"
 
 
 def _json(value: object) -> str:

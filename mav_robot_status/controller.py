@@ -157,7 +157,7 @@ class IndustrialRobotStatusController:
         sent, handle = output.sent, self.handle
         if sent is None:
             return True
-        status, detail = sent  # mostly the same values, and then not compared
+        status, detail = sent  # usually the same objects, which need no comparison
         return (status is not handle.status and status != handle.status) or (
             detail is not handle.detail and detail != handle.detail
         )

@@ -20,7 +20,7 @@ class DueTimes(Generic[K]):
 
     def __init__(self) -> None:
         self.first = math.inf
-        """The earliest time; inf if nothing is due ever."""
+        """The earliest time; inf if nothing is ever due."""
         self._order: list[tuple[float, int, K]] = []
         self._entries: dict[K, tuple[float, int, K]] = {}
         self._numbers = count()  # no two entries are equal, so keys are never compared

@@ -2,7 +2,7 @@
 
 A process makes two hundred such classes when it starts, and the standard library compiles the source of one to six
 functions for each at once. Here a class compiles its constructor at its first use, and most are never used in a run.
-All other functions are shared. A class that other packages derive from, as `Options`, is one of the standard library.
+All other functions are shared. A class that other packages derive from, such as `Options`, uses the standard library.
 """
 
 from __future__ import annotations

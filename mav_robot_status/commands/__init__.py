@@ -45,7 +45,7 @@ class Command(Protocol):
 
 @contextmanager
 def importing() -> Iterator[None]:
-    """While modules are imported: without the garbage collector. It would search what stays anyway."""
+    """Pause the garbage collector while modules are imported: it would only search objects that stay."""
     gc.disable()
     try:
         yield

@@ -31,7 +31,7 @@ def with_arms(config: Config, texts: Sequence[str]) -> Config:
         interfaces += (_interface(text, {interface.name for interface in interfaces} | _handles(config)),)
     if len(set(texts)) < len(texts):
         twice = next(text for text in texts if texts.count(text) > 1)
-        raise UsageError(f"--arm {twice} is there twice: one arm has one handle")
+        raise UsageError(f"--arm {twice} is given twice: one arm has one handle")
     return dataclasses.replace(config, interfaces=interfaces, groups=config.groups or _group(config))
 
 

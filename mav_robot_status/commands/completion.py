@@ -22,7 +22,7 @@ class Flag(NamedTuple):
 
     names: tuple[str, ...]
     takes: str
-    """How the help calls its value; empty for a switch."""
+    """The name of its value in the help; empty for a switch."""
     choices: tuple[str, ...]
     words: str
 
@@ -33,7 +33,7 @@ class Flag(NamedTuple):
 
 
 class Completed(NamedTuple):
-    """What can be written behind one command."""
+    """What can be written after one command."""
 
     flags: tuple[Flag, ...]
     choices: tuple[str, ...]
@@ -50,7 +50,7 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 
 
 def completed() -> dict[str, Completed]:
-    """What can be written behind each command."""
+    """What can be written after each command."""
     return {name: _completed(parser) for name, parser in parsers().items()}
 
 
@@ -71,7 +71,7 @@ def actions_of(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentPa
 
 
 def takes(action: argparse.Action) -> str:
-    """How the help calls the value of an argument; empty for a switch."""
+    """The name of the value of an argument in the help; empty for a switch."""
     if action.nargs == 0:
         return ""
     return action.metavar if isinstance(action.metavar, str) else action.dest.upper()

@@ -49,7 +49,7 @@ def vehicles(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run until the end of the scenario; without an end for a table, a page, a fleet, or another program."""
+    """Run until the scenario ends; endlessly with a table, a page, a fleet or another receiver."""
     from ..demo import DEMO_CONTROLLER, fleet, receiver, run_demo, run_mobile_manipulator
     from ..views.terminal import is_screen
 

@@ -18,7 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """The connections and the duration."""
     connections(parser, "what to listen to")
     parser.add_argument(
-        "--seconds", type=seconds, metavar="S", default=5.0, help="listen so long, from the first heartbeat on (5)"
+        "--seconds", type=seconds, metavar="S", default=5.0, help="listen for this long after the first heartbeat (5)"
     )
     parser.add_argument("--as-json", action="store_true", help="as JSON, one object for each connection")
     publisher(parser, Ros2Options)
@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """0: every connection and every arm has a status, and its ROS 2 topics can be had; 1: one lacks it."""
+    """0: every connection and every arm has a status, and the ROS 2 topics are available; 1: otherwise."""
     from ..diagnosis.doctor.arm_diagnosis import arm_as_json, arm_as_text
     from ..diagnosis.doctor.arms import examine_arm
     from ..diagnosis.doctor.listen import examine
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _ros2(options: argparse.Namespace) -> bool:
-    """Whether the ROS 2 topics can be had."""
+    """Whether the ROS 2 topics are available."""
     from ..diagnosis.doctor.ros2 import as_json, as_text, diagnose, examine
     from ..publishers.ros.settings import read
 

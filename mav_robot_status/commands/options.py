@@ -29,8 +29,8 @@ WITH_ARGUMENTS: Final = {
     "simple_message": (("--simple-message",), "publishers.simple_message.options", "SimpleMessageOptions"),
     "ros2": (("--ros2",), "publishers.ros.options", "Ros2Options"),
 }
-"""The publishers that the command line adds: how their flags begin, that which enables it first; and the declaration of
-their options."""
+"""The publishers that the command line can add. For each: the beginnings of its flags, first that of the flag that
+enables it; and the class that declares its options."""
 
 FORMS = "forms"
 """A placeholder in a parser for the connection forms: finding every kind of link scans the installed packages."""
@@ -114,7 +114,7 @@ def publisher(parser: argparse.ArgumentParser, options: type[Options], without: 
 def publishers(parser: argparse.ArgumentParser) -> None:
     """The arguments of the publishers in WITH_ARGUMENTS that the given ones may name: the first flag enables each.
 
-    A declaration takes a hundredth of the start of a gateway.
+    To declare the arguments of one publisher takes 1 % of the time in which a gateway starts.
     """
     words = getattr(parser, "words", None)
     for kind, (flags, _, _) in WITH_ARGUMENTS.items():
@@ -130,7 +130,7 @@ def options_of(kind: str) -> type[Options]:
 
 
 def may_name(flag: str, words: Iterable[str]) -> bool:
-    """Whether one of these arguments may be a flag that begins with `flag`, cut short or not; or asks for the help."""
+    """Whether one of these arguments may be a flag that begins with `flag`, abbreviated or not, or asks for help."""
     for word in words:
         name = word.partition("=")[0]
         if name[:1] != "-":

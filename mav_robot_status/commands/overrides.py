@@ -38,7 +38,7 @@ def _once(names: Sequence[tuple[tuple[int, int | None], str]]) -> dict[tuple[int
     for (system, component), name in names:
         if found[system, component] != name:
             who = f"{system}" if component is None else f"{system}.{component}"
-            raise UsageError(f"--name {who}= is there twice: one vehicle has one name")
+            raise UsageError(f"--name {who}= is given twice: one vehicle has one name")
     return found
 
 
@@ -89,7 +89,7 @@ def with_publisher(
 ) -> tuple[ControllerConfig, ...]:
     """The controllers with the publisher of the command line, which replaces those of its type.
 
-    The first flag of its options enables it. Raises UsageError for another of its flags without the first.
+    The first flag of its options enables it. Raises UsageError if another of its flags is given without the first.
     """
     enables = WITH_ARGUMENTS[kind][0][0].strip("-").replace("-", "_")
     if not hasattr(options, enables):  # none of its arguments is there

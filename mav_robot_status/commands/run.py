@@ -51,7 +51,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-kernel-filter", action="store_true", help="read every datagram, and count lost frames")
     parser.add_argument("--raw", action="store_true", help="the log is a raw capture of MAVLink, without time stamps")
     parser.add_argument(
-        "--max-gap", type=gap, metavar="S", help="a longer silence in a log, once lost, is one line (60)"
+        "--max-gap", type=gap, metavar="S", help="once the link is lost, a longer silence in a log is one line (60)"
     )
     verbosity(parser)
 

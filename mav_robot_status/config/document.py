@@ -28,7 +28,7 @@ _HINTS: Final = {
     "'\\t'": "indent with spaces, not with tabs",
     "mapping values are not allowed": "check the indentation, and quote a text that contains ': '",
     "expected <block end>": "check the indentation of this line",
-    "found another document": "one document a file: remove the line '---'",
+    "found another document": "write one document per file: remove the line '---'",
     "could not find expected ':'": "write 'key: value'",
     "expected ',' or": "close the bracket",
     "undefined alias": "quote a text that starts with '*'",
@@ -96,7 +96,7 @@ def load_document(path: str | os.PathLike[str]) -> Node:
     try:
         return parse_document(data.decode("utf-8-sig"), name)
     except UnicodeDecodeError as error:
-        # utf-8-sig counts from behind the byte order mark, `object` is what it counts in.
+        # `error.start` is a position in `error.object`, which does not include the byte order mark
         place = _place(name, error.object[: error.start].decode("utf-8", "replace"))
         raise ConfigError(f"{place}: not UTF-8 text: save the file as UTF-8") from None
 
@@ -132,7 +132,7 @@ class _Loader(yaml.SafeLoader):
         self.depth += 1
         self.values += 1
         if self.check_event(yaml.AliasEvent):
-            self._refuse("aliases (*name) are not taken here: write the value out")
+            self._refuse("aliases (*name) are not allowed here: write the value out")
         if self.depth > MAX_DEPTH:
             self._refuse(f"nested more than {MAX_DEPTH} deep: this is not a configuration file")
         if self.values > MAX_VALUES:
@@ -173,7 +173,7 @@ class _Builder:
                 raise key.fault(f"a key must be a word, not {key.shown()}")
             if (first := entries.get(key.text)) is not None:
                 place = first.key.at.removeprefix(f"{self._file}:") if first.key else ""
-                raise key.fault(f"the key {quoted(key.text)} is there twice, first at {place}: remove one")
+                raise key.fault(f"the key {quoted(key.text)} is given twice, first at {place}: remove one")
             entries[key.text] = self.node(value_node, short(key.text), key)
         return entries
 

@@ -36,7 +36,7 @@ class LinkConfig:
     """Whether ROBOT_STATUS is sent to the vehicles there. None: yes, except on serial links, which are slow."""
     speech_limit: Annotated[float | None, Within(0.0, 1e5, "B/s"), Or("auto")] = None
     """The most bytes a second that we send there without being asked. 0: no limit. None: 1000 on a link to vehicles,
-    no limit on an out, which is an order to send."""
+    no limit on an out: the user has ordered us to send there."""
 
     heartbeat_timeout: Annotated[float | None, Within(0.1, 86400.0, "s"), Or("auto")] = None
     """Seconds without a heartbeat after which a vehicle there counts as lost. None: `hardware.heartbeat_timeout`; for a
@@ -86,8 +86,8 @@ class SigningConfig:
     accept_unsigned: Literal["none", "radio_status", "all"] = "radio_status"
     """Frames that are accepted without a signature: telemetry radios have no key to sign their RADIO_STATUS."""
     link_id: Annotated[int, Within(0, 255)] = 192
-    """The link id of our first link. Each further link and out has the next one. Only senders with our system and
-    component ids must use others."""
+    """The link id of our first link. Each further link and out has the next one. Another sender with our
+    system and component ids must use other link ids."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +146,8 @@ class Config:
     vehicles: tuple[VehicleConfig, ...] = ()
     """Empty: every autopilot heard becomes a handle."""
     names: Mapping[tuple[int, int | None], str] = field(default_factory=dict)
-    """More names of vehicles by system and component id: those of entries without a `handle`, and of `--name`. None as
-    component: each autopilot of the system."""
+    """More names of vehicles by system and component id, from entries without a `handle` and from `--name`. Component
+    None: each autopilot of the system."""
     identity: IdentityConfig = IdentityConfig()
     hardware: HardwareOptions = field(default_factory=HardwareOptions)
     """The options of the MAVLink hardware interface."""
@@ -165,7 +165,7 @@ class Config:
     """Whether the kernel drops datagrams that no status needs, on UDP links whose frames nobody else needs. None: yes,
     unless a publisher can show how many frames were lost."""
     max_gap: Annotated[float, Within(0.0, 86400.0, "s")] = 60.0
-    """A longer silence of a recorded log, after the link is lost, gives one line."""
+    """After the link is lost, a silence of a recorded log that is longer than this gives one line."""
     forward: bool = False
     """Forward every frame between the links and the outs, by MAVLink's routing rules."""
     record: Annotated[str | None, Or("none")] = None

@@ -95,7 +95,7 @@ def _names(given: dict[str, Node]) -> tuple[dict[str, Node], dict[tuple[int, int
             )
         entry: NameConfig = read(NameConfig, node)
         if (entry.system, entry.component) in names:
-            raise node.fault(f"system {entry.system} is there twice: one vehicle has one name")
+            raise node.fault(f"system {entry.system} is given twice: one vehicle has one name")
         names[entry.system, entry.component] = entry.name
     return {**given, "vehicles": section._replace(value=expected)}, names
 
@@ -139,8 +139,8 @@ def _check_hysteresis(config: Config, given: dict[str, Node]) -> None:
 def _check_identity(config: Config, given: dict[str, Node]) -> None:
     if config.identity.system == GROUND_STATION:
         raise entries(given["identity"])["system"].fault(
-            f"our system id cannot be {GROUND_STATION}: autopilots take it for their ground station's (SYSID_MYGCS) "
-            "and would not notice its loss; write auto, or another number"
+            f"our system id cannot be {GROUND_STATION}: autopilots take it for the id of their ground station "
+            "(SYSID_MYGCS), and would not notice the loss of that station; write auto, or another number"
         )
 
 
@@ -175,7 +175,7 @@ def _check_vehicles(vehicles: tuple[VehicleConfig, ...], given: dict[str, Node])
         handles.add(vehicle.handle)
         if vehicle.system is not None:
             if (vehicle.system, vehicle.component) in systems:
-                raise node.fault(f"system {vehicle.system} is there twice: one vehicle has one handle")
+                raise node.fault(f"system {vehicle.system} is given twice: one vehicle has one handle")
             systems.add((vehicle.system, vehicle.component))
 
 
@@ -204,7 +204,7 @@ def _check_groups(config: Config, given: dict[str, Node]) -> None:
             if handle in config.groups:
                 raise item.fault(f"{quoted(handle)} is a group: a group has robots as members; name those")
             if group.handles.count(handle) > 1:
-                raise item.fault(f"{quoted(handle)} is there twice: one member counts once")
+                raise item.fault(f"{quoted(handle)} is given twice: one member counts once")
         for field, rule in group.fields.items():
             if rule.of is not None and group.handles and rule.of not in group.handles:
                 raise entries(written["fields"])[field].fault(

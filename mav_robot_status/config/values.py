@@ -183,7 +183,7 @@ def _rule(node: Node) -> Rule:
 
 
 def _mode_overrides(node: Node) -> dict[int, RobotMode]:
-    """The modes to publish, by custom_mode. The key of the node is the vehicle family, whose names are known."""
+    """The modes to publish, by custom_mode. The key of the node is the vehicle family, which gives the mode names."""
     family = node.key.text if node.key else ""
     known = numbers(family)
     found: dict[int, RobotMode] = {}
@@ -194,7 +194,7 @@ def _mode_overrides(node: Node) -> dict[int, RobotMode]:
             raise key.fault(_no_mode(family, key, known))
         number = read(CustomMode, key) if number is None else number
         if number in found:
-            raise key.fault(f"mode {number} of {family} is there twice, as {quoted(name)} and with another name")
+            raise key.fault(f"mode {number} of {family} is given twice, as {quoted(name)} and with another name")
         found[number] = read(RobotMode, value)
     return found
 

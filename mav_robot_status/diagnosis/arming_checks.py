@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def reports(hw: MavlinkRobotHW) -> dict[str, list[dict[str, Any]]]:
-    """By handle, for each PX4 with a complete report: its failing checks, those of all modes."""
+    """For each PX4 with a complete report, by handle: its checks that fail in any mode."""
     return {
         t.handle.name: _report(t.state)
         for t in hw.vehicles

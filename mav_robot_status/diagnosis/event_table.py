@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 HEARD_BY: Final = 15.0  # s to wait for the first heartbeat
 KNOWN_BY: Final = 5.0
-"""Seconds from the first heartbeat until the vehicles that are heard count as all."""
+"""Seconds from the first heartbeat. After that no further vehicle is expected."""
 OFFERED_BY: Final = 30.0
 """Seconds from the first heartbeat until a PX4 should have told where its metadata is. It is asked for other messages
 first, and at most four times."""
@@ -89,7 +89,7 @@ def why_not(hardware: MavlinkHardware, listened: float, known: float | None) -> 
         return NoTableError(f"no PX4 was heard, and only PX4 has a table of its events: {others}")
     first = _named(px4[0], "PX4")
     if all(ids in given_up for ids in px4):
-        return NoTableError(f"{first}, gives no table of its events: {given_up[px4[0]]}")
+        return NoTableError(f"{first}, does not provide the table of its events: {given_up[px4[0]]}")
     if known >= OFFERED_BY and not any(ids in offers for ids in px4):
         return NoTableError(f"{first}, does not send COMPONENT_METADATA: PX4 has it from 1.13 on")
     return None

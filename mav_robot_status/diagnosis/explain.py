@@ -122,7 +122,7 @@ def moment(at: str, start_us: int) -> int:
 
 
 def explanations(hw: HardwareInterface, vehicles: MavlinkRobotHW, now: Instant) -> list[dict[str, Any]]:
-    """One explanation for each robot heard. That of an ArduPilot has a member `applet`, of a PX4 `arming_checks`."""
+    """One explanation for each robot heard. An ArduPilot's has a member `applet`, a PX4's `arming_checks`."""
     heard = list(filter(_is_heard, hw.handles))
     for handle in heard:
         hw.explain(handle.name, now)

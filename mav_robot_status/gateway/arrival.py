@@ -5,7 +5,8 @@ SIGSTOP, a pause of the virtual machine, a suspend of the system, or a turn that
 for new: a vehicle that was disarmed before the pause may be armed now.
 
 - A datagram has the time stamp of the kernel.
-- Nothing dates the bytes of a stream. They count as old as they can be: as arrived when the link was last seen empty.
+- Nothing dates the bytes of a stream. They count as arrived when the link was last seen empty: they
+  cannot be older.
 """
 
 from __future__ import annotations
@@ -26,12 +27,12 @@ if TYPE_CHECKING:
     Piece = tuple[bytes, Address]
     Pieces = Sequence[Piece]
     Found = tuple[list[tuple[Instant, Piece]], dict[Address, Instant]]
-    """Pieces with their times, and the sources with unread input: when that had arrived at the earliest."""
+    """Pieces with their times; for each source with unread input, the earliest time at which that may have arrived."""
 
 LATE: Final = 0.2
 """Seconds between two looks at the links after which the stamps of datagrams are read."""
 STALL: Final = 0.5
-"""Seconds by which a wake-up may be late until the bytes of streams count as old."""
+"""Seconds by which a wake-up may be late before the bytes of streams count as old."""
 WALL_STEP: Final = 0.1
 """Seconds by which the wall clock may drift against the monotonic one between two looks. The kernel stamps datagrams
 with the wall clock: if that was set meanwhile, the stamps prove nothing."""
@@ -60,10 +61,13 @@ class Arrivals:
     def __init__(self) -> None:
         self.pause: Pause | None = None
         self._behind: dict[Endpoint, dict[Address, Instant]] = {}
-        """The links with unread input, and for each source when its input had arrived at the earliest."""
+        """The links with unread input, and for each source the earliest time at which that may have arrived."""
 
     def left(self, endpoint: Endpoint, pieces: Pieces, now: Instant) -> bool:
-        """A read at `now` has left input on a link, unless all pieces of a stream are short. Whether any link has."""
+        """Note that a read at `now` has left input on a link, unless all pieces of a stream are short.
+
+        Returns whether input of any link may be old.
+        """
         sources = {source for data, source in pieces if len(data) >= CHUNK} if endpoint.link.stream else {None}
         return self._keep(endpoint, dict.fromkeys(sources, now))
 

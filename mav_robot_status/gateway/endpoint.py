@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MOST_SOURCES: Final = 64
-"""Limit of channels of one link. The one silent longest is dropped, but none on which a vehicle speaks."""
+"""Limit of channels of one link. A newcomer replaces the one silent longest, but none on which a vehicle speaks."""
 MOST_PEERS: Final = 8
 PEER_SILENCE: Final = 30.0
 """Seconds of silence after which a peer is forgotten."""
 NEWCOMER_SILENCE: Final = 5.0
-"""Seconds for which a silent newcomer keeps its place. Who has spoken for longer keeps it for as long."""
+"""Seconds for which a silent newcomer keeps its place. A peer that has spoken for longer keeps it for that time."""
 ACTIVE: Final = 10.0
 """Seconds since the last valid frame for which a peer counts as active."""
 NEVER: Final = -math.inf
@@ -78,7 +78,7 @@ class Channel:
         """The frames of the parser when `Endpoint.forget_silent` was called last."""
         self.active_at = NEVER
         self.quiet = False
-        """Whether only vehicles are heard there that send HIGH_LATENCY2 alone: what we send there costs them dearly."""
+        """Whether all vehicles heard there send only HIGH_LATENCY2: each byte that we send there costs money."""
         self.systems: set[int] = set()
         """The system ids of the vehicles that are heard there: messages about others are not sent there."""
         self.wanted = WANTED_IDS
@@ -95,13 +95,13 @@ class Channel:
         return self.endpoint.passive
 
     def hear_files(self, on: bool) -> None:
-        """Use messages that bring files, or no longer. May be repeated: its parser may be another one meanwhile."""
+        """Start or stop using messages that bring files. May be repeated: the channel may have another parser now."""
         self.wanted = IDS_WITH_FILES if on else WANTED_IDS
         self.parser.want(self.wanted)
         self.endpoint.filter.widen(self.wanted)
 
     def gives_way(self, now: float) -> bool:
-        """Whether it leaves its place to another, because no vehicle speaks on it."""
+        """Whether it gives up its place to another, because no vehicle speaks on it."""
         spoken = max(NEWCOMER_SILENCE, self.heard_at - self.since)
         return now - self.heard_at > min(spoken, PEER_SILENCE)
 
@@ -151,7 +151,7 @@ class Endpoint:
         self._scratch = Parser(self._wanted)
         """Parses the first bytes of an address. Only a valid frame gives it a channel."""
         self._stranger: Address = None
-        """The address whose bytes it has."""
+        """The address whose bytes `_scratch` has."""
         self.is_out = is_out
         self.filter = KernelFilter(self.link)
         self.adjust(config, number, keep_all=keep_all, filters=filters)
@@ -310,7 +310,7 @@ class Endpoint:
         return total
 
     def log_silence(self) -> None:
-        """Log that no autopilot was heard on this link, what was received, and what finds the cause."""
+        """Log that no autopilot was heard on this link, what was received, and the command that finds the cause."""
         got = self.totals()
         received = (
             f"{got.frames} MAVLink frames"

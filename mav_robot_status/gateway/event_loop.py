@@ -123,7 +123,7 @@ class EventLoop:
                 wait = rest = due - now.mono
                 if now.mono < self._pace.rests_until:
                     rest -= self._rest(now.mono, due)
-                # poll takes milliseconds: rounded down, the loop would spin until the due time
+                # poll takes whole milliseconds: rounding down would make the loop spin until the due time
                 events = poll.poll(math.ceil(rest * 1000) if rest > 0 else 0)
                 before, now = now, self._clock()
                 if events:
@@ -135,7 +135,7 @@ class EventLoop:
     def _receive(
         self, events: Sequence[tuple[int, int]], before: float, looked: Instant, now: Instant, wait: float
     ) -> None:
-        """Read the sources that have input, which was waited for since `before`. `looked`: the last look at them."""
+        """Read the sources that have input. The loop has waited since `before`; `looked` is its last look at them."""
         limit = self._pace.limit(before, now.mono)
         if now.mono - looked.mono > LATE:
             limit = self._look_late(looked, now, wait)
@@ -147,7 +147,7 @@ class EventLoop:
                     self._pace.count(UNCOUNTED if read is None else read, now.mono)
 
     def _look_late(self, looked: Instant, now: Instant, wait: float) -> int:
-        """Tell the links that their input may be old, and how many datagrams to read.
+        """Tell the links that their input may be old. Returns how many datagrams to read.
 
         `looked` is the instant of the last look at the links, `wait` how many seconds the loop wanted to wait.
         """

@@ -26,7 +26,7 @@ MOST_FILES: Final = 64
 MODE: Final = 0o644
 NEW: Final = ".new-"
 ABANDONED: Final = 3600.0
-"""Seconds after which an unfinished file is one of a program that was killed."""
+"""Seconds after which an unfinished file counts as left behind by a killed program."""
 NAME: Final = re.compile(r"[0-9A-F]{8}\.json\.xz")
 
 

@@ -4,8 +4,8 @@ The vehicle sends COMPONENT_METADATA because it is asked for it once, see `autop
 up by the checksum in it; a table that is not there is read over MAVLink FTP, one at a time on each link. So the second
 vehicle of a fleet finds the table of the first one in memory. Disk and parser run off the loop.
 
-Nothing is sent on a passive link. What cannot be had is given up in one log line, and tried again at the earliest a
-minute later, and only if the vehicle offers its metadata again: it does so after a reboot.
+Nothing is sent on a passive link. If a table cannot be fetched, one log line says so. It is tried again after a
+minute at the earliest, and only if the vehicle offers its metadata again, as it does after a reboot.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class EventTables:
         parse: Callable[[bytes], EventTable],
         cache: EventTableCache | None = None,
     ) -> None:
-        """`parse` makes a table of the bytes of its file, off the loop, and raises ValueError; `use` gets it."""
+        """`parse` makes a table from the bytes of its file, off the loop, and raises ValueError; `use` gets it."""
         self._hub = hub
         self._use = use
         self._parse = parse
@@ -222,7 +222,7 @@ class EventTables:
 
     def _share(self, ids: Ids, vehicle: _Vehicle) -> None:
         """Another vehicle has brought the table."""
-        log.info("vehicle %d.%d: its events are those of another vehicle", *ids)
+        log.info("vehicle %d.%d: it uses the table of events of another vehicle", *ids)
         self._give(ids, vehicle, self._tables[vehicle.offer.crc])
 
     def _begin(self, ids: Ids, vehicle: _Vehicle, now: float) -> None:
@@ -316,7 +316,7 @@ class EventTables:
                 self._tables.popitem(last=False)
 
     def _give(self, ids: Ids, vehicle: _Vehicle, table: Any) -> None:
-        if self._vehicles.get(ids) is not vehicle:  # it is gone, or another one meanwhile
+        if self._vehicles.get(ids) is not vehicle:  # it is gone, or was replaced meanwhile
             return
         vehicle.stage = _Stage.HAS_TABLE
         if vehicle.download is None:

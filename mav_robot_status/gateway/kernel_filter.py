@@ -6,8 +6,8 @@ vehicle is judged by the same frames with it and without it: a parser returns no
 Some things need the other datagrams too, for a while. Then the filter is lifted:
 
 - No heartbeat arrives: the log counts everything that does.
-- Frames end in another datagram than they begin in: a part of a frame may look like a whole one.
-- A second sender speaks on a link with one peer: whether that peer is silent, only all of its datagrams tell.
+- Frames begin in one datagram and end in another: a part of a frame may look like a whole one.
+- A second sender speaks on a link with one peer: only all datagrams of that peer show whether it is silent.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ log = logging.getLogger(__name__)
 LIFTED: Final = 60.0
 """Seconds for which it stays lifted after a cut frame or a second sender."""
 DRAINED: Final = 1.0
-"""Seconds after its end until no datagram waits that it has let pass, so that sequence numbers are whole again."""
+"""Seconds after the filter ends. By then all that it let pass has been read, and sequence numbers are whole again."""
 SHOWS_COUNTERS: Final = "http"
-"""The publisher of ours that shows the counters of a connection."""
+"""Our publisher that shows the counters of a connection."""
 
 
 @lru_cache(maxsize=4)
@@ -114,7 +114,7 @@ class KernelFilter:
             self._begin(self._passes | wanted)
 
     def silence(self, since: float, now: float) -> float:
-        """The seconds for which a peer was certainly silent that was last heard at `since`. Lifts the filter."""
+        """The seconds for which a peer, last heard at `since`, has certainly been silent. Lifts the filter."""
         if self._allowed:
             self._lifted_until = now + LIFTED
             if self._passes is not None:

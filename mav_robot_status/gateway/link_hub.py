@@ -77,7 +77,7 @@ class LinkHub:
         self.is_plain = False
         """Whether `receive_one` may be used: nobody but the hardware interface sees the frames."""
         self.pieces = 0
-        """Datagrams that the last `receive` has read; of a stream, those that it would fill."""
+        """Datagrams that the last `receive` has read; for a stream, its bytes divided by STREAMED."""
         self.open(config)
 
     def open(self, config: Config) -> None:
@@ -150,7 +150,7 @@ class LinkHub:
     def receive_one(self, endpoint: Endpoint, now: Instant) -> Sequence[tuple[Frame, Channel]]:
         """As `receive` with a limit of 1, while `is_plain`. Most datagrams arrive alone, and hold nothing of interest.
 
-        Only this path is that short: between a wake-up and the next one nearly all code runs from a cold cache.
+        Only this path is so short: after a wake-up nearly all code runs from a cold cache.
         """
         link = endpoint.link
         pieces = link.receive(1)
@@ -213,7 +213,7 @@ class LinkHub:
     def _relay(self, pieces: Sequence[tuple[bytes, Address]], endpoint: Endpoint, now: Instant, heard: Heard) -> None:
         """Forward and hear pieces, while `_relays`. Most hold one frame, which takes a short path.
 
-        As `_hear` in all that it does, but without a list or a Frame for a frame that is only forwarded.
+        It does what `_hear` does, but makes no list and no Frame for a frame that is only forwarded.
         """
         router, mono = self._router, now.mono
         assert router is not None
@@ -245,7 +245,7 @@ class LinkHub:
                     heard.append((frame, channel))
 
     def _hear(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant, heard: Heard) -> None:
-        """Record and forward the frames of one piece, and add those to `heard` that a status needs."""
+        """Record and forward the frames of one piece, and add to `heard` those that a status needs."""
         if self._keep_all:
             frames = [frame for frame in frames if frame.message_id != SETUP_SIGNING]
             self._record(frames, now)

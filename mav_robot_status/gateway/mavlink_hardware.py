@@ -126,7 +126,7 @@ class MavlinkHardware:
         """
         table = event_table(config)
         self.hub.change(config)
-        # a frame of a closed link that waits would bring its vehicle back
+        # a waiting frame of a closed link would bring its vehicle back
         self._waiting = [one for one in self._waiting if one[2].endpoint in self.hub.endpoints]
         self._event_table = table
         self.vehicles.forget(self.hub.vehicles())
@@ -134,7 +134,7 @@ class MavlinkHardware:
         self._configure(config)
 
     def renew(self) -> None:
-        """Use the vehicles and options of the new configuration. Vehicles in both keep their state."""
+        """Use the vehicles and options of the new configuration. Vehicles in both configurations keep their state."""
         before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.claims, self._event_table)
         self.vehicles.adopt(before)
         self.vehicles.asks = before.asks

@@ -1,6 +1,6 @@
 """When the event loop looks for input, and how much it reads: at once while little arrives, in batches in a flood.
 
-A wake-up costs as much as ten frames. Somebody may wait for any input, and only who reads it knows. So all input is
+A wake-up costs as much as ten frames. Any input may be urgent, and only a read shows whether it is. So all input is
 read at once, as long as no more than RATE pieces arrive a second. Above that it gathers for PACE.
 """
 
@@ -17,7 +17,7 @@ BURST: Final = 16
 """Pieces that may arrive at any rate without a delay."""
 EACH: Final = 1 / RATE
 EMPTIED: Final = BURST / RATE
-"""Seconds in which a bucket with one piece empties, and a full one."""
+"""Seconds until a bucket with one piece is empty; the same for a full bucket."""
 UNCOUNTED: Final = round(RATE * PACE)
 """A source that does not count its pieces is paced if it wakes the process more than 500 times a second."""
 ALONE: Final = 0.0003
@@ -38,13 +38,13 @@ class Pace:
         """`gather`: seconds for which input always gathers, see `coalesce` of the configuration."""
         self.gather = gather
         self.rests_until = -math.inf
-        """The loop does not look before."""
+        """The loop does not look before this time."""
         self._alone = self._most_alone = 0 if gather else MOST_ALONE
 
     def limit(self, before: float, now: float) -> int:
-        """How many datagrams to read at `now`, after input that was waited for since `before`, rests included.
+        """How many datagrams to read at `now`, after the loop has waited for input since `before`, rests included.
 
-        If it is one, it is counted already.
+        If this returns 1, that datagram is already counted.
         """
         full = self.rests_until
         if now - before > ALONE and before >= full and self._alone:

@@ -189,7 +189,7 @@ class Pipeline:
             for controller in filter(self._may_start, self._idle):
                 controller.start(now)
             self._idle = [controller for controller in self._idle if not controller.running]
-            mono = now.mono  # no call for the many that are not concerned
+            mono = now.mono  # no call for the many controllers that have nothing to do
             concerned = [
                 c
                 for c in self._controllers

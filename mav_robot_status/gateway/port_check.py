@@ -33,7 +33,7 @@ class Taken(NamedTuple):
 
 
 def of_links(config: Config) -> Iterator[Taken]:
-    """What the links and the outs take. The system chooses a port 0, so nobody else has it."""
+    """What the links and the outs take. For port 0 the system chooses a free port, so it is left out."""
     for link in (*config.links, *config.outs):
         url = parse(link.url)
         if url.kind.is_serial:
@@ -52,5 +52,5 @@ def check_taken(taken: Iterable[Taken]) -> None:
 
 
 def _overlap(one: str, other: str) -> bool:
-    """Whether two hosts can be one address of this computer. Addresses of IPv4 and IPv6 are apart."""
+    """Whether two hosts can be one address of this computer. An IPv4 address is never an IPv6 address."""
     return one == other or ((":" in one) is (":" in other) and (one in EVERY or other in EVERY))

@@ -45,7 +45,7 @@ class NoMavlinkPort:
 
 
 def replay(config: Config, path: str, stdout: TextIO, *, raw: bool = False) -> None:
-    """Replay the log at `path`, `raw`: without time stamps.
+    """Replay the log at `path`. `raw`: the log has no time stamps.
 
     Raises UsageError if it cannot be read, BrokenPipeError if stdout is closed.
     """

@@ -66,7 +66,7 @@ WHOLE: Final = -1  # instead of a component: the whole system
 EVERYBODY: Final = (0, 0)
 UNCHECKED: Final = (0, -1)  # a broadcast that teaches nothing
 BROADCASTS: Final = frozenset(CRC_EXTRA.keys() - TARGETS.keys() - {HEARTBEAT, *RADIO})
-"""The checked messages without a target. Most frames have these ids, and all of a sender go the same way."""
+"""The checked messages without a target. Most frames have these ids, and those of one sender all go the same way."""
 
 
 class Channel(Protocol):

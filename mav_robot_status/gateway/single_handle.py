@@ -1,4 +1,4 @@
-"""Publishers that serve one handle, because their receivers cannot tell whose status they get: which handle it is."""
+"""The handle of each publisher that serves only one, because its receivers cannot tell whose status they get."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ log = logging.getLogger(__name__)
 
 
 class SingleHandles:
-    """The handle of each publisher that serves one: that of the first controller of a configuration that names it.
+    """The handle of each publisher that serves only one: the handle of the first controller with the publisher.
 
-    The default controller runs on every handle. Its publishers serve the first one of the configuration.
+    The default controller runs on every handle. Its publishers serve the first handle of the configuration.
     """
 
     def __init__(self, config: Config) -> None:
@@ -32,7 +32,7 @@ class SingleHandles:
                     self._handles.setdefault(publisher_key(publisher), name)
 
     def serves(self, publisher: PublisherConfig, controller: ControllerConfig) -> bool:
-        """Whether a publisher serves the handle of a controller. The log names the first one that it does not."""
+        """Whether a publisher serves the handle of a controller. The log names the first that it does not serve."""
         handle = handle_name(controller)
         only = self._handles.get(publisher_key(publisher), handle)
         if only != handle and publisher.type not in self._told:

@@ -1,4 +1,4 @@
-"""What we say on one link without being asked: a bound, fair to all vehicles, and counted.
+"""What we say on one link without being asked. It is bounded, shared fairly by all vehicles, and counted.
 
 A heartbeat or a status beyond the bound waits. A newer message of the same kind about the same vehicle replaces it, and
 keeps its place in the queue. So no vehicle starves, and nothing waits that is out of date.

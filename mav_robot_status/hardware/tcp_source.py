@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 MINUTE: Final = 60.0  # s
 PAUSE: Final = 2.0
-"""Seconds between two turns after which this program was stopped: a running gateway makes one every second."""
+"""This many seconds between two turns mean that this program was stopped: a running gateway turns every second."""
 
 MOST_PIECES: Final = 4
 """Pieces of 8 kB that one turn reads, however much waits: a controller that floods does not delay a vehicle."""
@@ -39,7 +39,7 @@ class TcpSource:
         self._turn_at = now.mono
 
     def is_new(self) -> bool:
-        """Whether there is another connection than at the last call that was true."""
+        """Whether there is a new connection since this last returned True."""
         if not self.link.connected or self.link.connections == self._known:
             return False
         self._known = self.link.connections

@@ -46,7 +46,7 @@ _ENUMS: Final = {Kind.MODE: RobotMode, Kind.TRI_STATE: TriState}
 
 
 def _powered_in_part(status: RobotStatus, stops_cut_power: bool) -> str | None:
-    """The invariants of a single robot. A group has some parts that are stopped beside others that are powered."""
+    """The invariants of a single robot. In a group some parts may be stopped while others are powered."""
     if stops_cut_power and status.e_stopped is TRUE and status.drives_powered is not FALSE:
         return "I1: e_stopped is TRUE, so drives_powered must be FALSE"
     if status.drives_powered is FALSE and status.motion_possible is not FALSE:

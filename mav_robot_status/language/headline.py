@@ -80,7 +80,7 @@ NEEDS_A_LOOK: Final = 3
 
 UNHEARD: Final = "LINK_STALE"
 """The inhibit that says that a robot is not heard."""
-SINCE: Final = "Nothing is known since"
+SINCE: Final = "Unknown since"
 LAST: Final = "Last known"
 MAY_MOVE: Final = Sentence("It may be moving")
 MOTION_UNKNOWN: Final = Sentence("Whether it moves is unknown")
@@ -121,7 +121,7 @@ def _built(row: _Row, sentences: tuple[Sentence, ...], found: Remedy | None) -> 
 
 
 def _state(line: Line) -> str:
-    """The key of ROWS. It never says of a group that nothing of it moves."""
+    """The key of ROWS. For a group it never says that no part of it moves."""
     link = _part(line, "link")
     if link.get("state") != "CONNECTED":
         return "not heard" if link.get("state") == "NEVER_SEEN" else "lost"
@@ -240,7 +240,7 @@ def _list(line: Line, name: str) -> list[Mapping[str, Any]]:
 
 
 def _inhibits(line: Line) -> list[Mapping[str, Any]]:
-    """The inhibits, those with words of the autopilot after the others. A lost link is not one: it says nothing."""
+    """The inhibits, those with words of the autopilot last. A lost link is left out: it gives no reason."""
     found = (one for one in _list(line, "inhibits") if one.get("name") != UNHEARD)
     return sorted(found, key=lambda one: bool(one.get("text")))
 

@@ -29,7 +29,7 @@ _CHARGE: Final = "Charge or change the battery."
 _RETURN: Final = "Bring it back or land it."
 _FIX: Final = "Be ready to take it over. Wait for a fix or check the antenna."
 _REST: Final = "Land it or bring it to rest."
-_CALIBRATE: Final = f"{_REST} Restart the autopilot, and calibrate the sensor if this stays."
+_CALIBRATE: Final = f"{_REST} Restart the autopilot, and calibrate the sensor if this persists."
 _CABLE: Final = f"{_REST} Check the cable, the power and the settings of this sensor."
 _OPEN_SKY: Final = "Take it over or bring it to rest. Let it find its position again, still and under open sky."
 _INSPECT: Final = "Find out what happened, and inspect the vehicle before it is armed again."
@@ -53,12 +53,12 @@ INHIBIT_ROWS: Final[dict[str, Remedy]] = {
         "safety-switch",
     ),
     "PREARM_FAILING": Remedy("it cannot be armed", _LOOK, "arming"),
-    "INITIALISING": Remedy("the autopilot starts", "Wait, and keep the vehicle still.", "starting", person=False),
+    "INITIALISING": Remedy("the autopilot is starting", "Wait, and keep the vehicle still.", "starting", person=False),
     "CALIBRATING": Remedy(
-        "the autopilot calibrates its sensors", "Wait, and keep the vehicle still.", "starting", person=False
+        "the autopilot is calibrating its sensors", "Wait, and keep the vehicle still.", "starting", person=False
     ),
     "POWERING_OFF": Remedy(
-        "the autopilot shuts down", "Switch it on again if it is to move.", "starting", person=False
+        "the autopilot is shutting down", "Switch it on again if it is to move.", "starting", person=False
     ),
     "TERMINATION": Remedy("its operation was terminated", _INSPECT, "crash"),
     "EMERGENCY": Remedy("the autopilot reports an emergency", _INSPECT, "crash"),
@@ -106,8 +106,8 @@ ERROR_ROWS: Final[dict[str, Remedy]] = {
         "ground-station",
     ),
     "BATTERY_LOW": Remedy("the battery is low", f"{_RETURN} {_CHARGE}", "battery"),
-    "TERRAIN": Remedy("it lacks data of the terrain", "Connect the ground station, which has them.", "mission"),
-    "TRAFFIC": Remedy("other traffic is near", "Wait until the traffic has passed, and give it way.", "surroundings"),
+    "TERRAIN": Remedy("it lacks terrain data", "Connect the ground station, which provides it.", "mission"),
+    "TRAFFIC": Remedy("other traffic is near", "Wait until the traffic has passed, and give way.", "surroundings"),
     "GPS": Remedy("the GPS position is not reliable", _FIX, "gps"),
     "GEOFENCE": Remedy("it is outside its fence", "Bring it back inside its fence.", "surroundings"),
     "PRESSURE": Remedy("the pressure inside its hull is too high", "Bring it to the surface and check it.", "crash"),
@@ -134,7 +134,9 @@ ERROR_ROWS: Final[dict[str, Remedy]] = {
         "Start the program that commands it, and check its connection.",
         "ground-station",
     ),
-    "MISSION": Remedy("its mission cannot go on", "Check the mission, and write it to the autopilot again.", "mission"),
+    "MISSION": Remedy(
+        "its mission cannot continue", "Check the mission, and write it to the autopilot again.", "mission"
+    ),
     "SYSTEM_ID_CONFLICT": Remedy(
         "two autopilots use its ids", "Give every autopilot a system id of its own.", "senders"
     ),
@@ -145,7 +147,7 @@ ERROR_ROWS: Final[dict[str, Remedy]] = {
     },
     **{f"EVENT_{level}": Remedy("the autopilot reports a problem", _LOOK, "arming") for level in range(3)},
 }
-"""The causes of errors of a vehicle, but the sensors."""
+"""The causes of errors of a vehicle, without the sensors."""
 
 
 def _unhealthy(what: str, step: str, topic: str) -> Remedy:
@@ -179,7 +181,7 @@ SENSOR_ROWS: Final[dict[str, Remedy]] = {
     ),
     "GEOFENCE": Remedy("it is outside its fence", "Bring it back inside its fence.", "surroundings"),
     "AHRS": Remedy("it is not sure of its attitude or position", _OPEN_SKY, "position"),
-    "TERRAIN": Remedy("it lacks data of the terrain", "Connect the ground station, which has them.", "mission"),
+    "TERRAIN": Remedy("it lacks terrain data", "Connect the ground station, which provides it.", "mission"),
     "REVERSE_MOTOR": Remedy("its motors are reversed", _MOTORS, "motors"),
     "LOGGING": Remedy("it cannot write its log", f"{_REST} Check the SD card of the autopilot.", "logging"),
     "BATTERY": Remedy(
@@ -218,14 +220,14 @@ ARM_ROWS: Final[dict[str, Remedy]] = {
     "CONFIRM_SAFETY": Remedy(
         "a person must confirm its safety configuration", "Confirm it on the teach pendant.", "robot-arm"
     ),
-    "BOOTING": Remedy("the controller starts", "Wait until the controller has started.", "starting", person=False),
+    "BOOTING": Remedy("the controller is starting", "Wait until the controller has started.", "starting", person=False),
     "POWER_OFF": Remedy("the arm has no power", "Switch the arm on if it is to move.", "robot-arm", person=False),
     "BRAKES_ENGAGED": Remedy(
         "its brakes are engaged", "Release the brakes if it is to move.", "robot-arm", person=False
     ),
-    "BACKDRIVE": Remedy("a person moves it by hand", "Wait until that person has ended.", "robot-arm", person=False),
+    "BACKDRIVE": Remedy("a person moves it by hand", "Wait until that person has finished.", "robot-arm", person=False),
     "UPDATING_FIRMWARE": Remedy(
-        "its firmware is updated", "Wait, and leave the controller switched on.", "starting", person=False
+        "its firmware is being updated", "Wait, and leave the controller switched on.", "starting", person=False
     ),
     "NOT_RUNNING": Remedy("the arm does not run", "Look at its state on the teach pendant.", "robot-arm"),
     "CONTROLLER_ERROR": Remedy(
@@ -245,7 +247,7 @@ REMEDIES: Final[dict[str, Remedy]] = {
 WHILE_ARMED: Final = frozenset(name for name in ERROR_ROWS if name.startswith(("TEXT_", "EVENT_")))
 """Words that the autopilot says while it is armed: it may be moving."""
 WORDS_DECIDE: Final = WHILE_ARMED | {"PREARM_FAILING", "CONFIGURATION"}
-"""The names that say nothing themselves: the step is that of the autopilot's words."""
+"""The names that say nothing by themselves: the step depends on the autopilot's words."""
 
 
 def remedy(cause: Mapping[str, Any]) -> Remedy:

@@ -1,4 +1,4 @@
-"""What a person can do about the words of an autopilot: families of them, in the order of their search.
+"""What a person can do about the words of an autopilot: families of words, in the order of the search.
 
 The words are those of ArduPilot's pre-arm checks (libraries/AP_Arming, and the page "Pre-Arm Safety Checks" of its
 documentation) and of PX4's arming checks (src/modules/commander/HealthAndArmingChecks, as texts and as events).
@@ -39,7 +39,7 @@ _STICKS: Final = r"throttle|\broll\b|\bpitch\b|\byaw\b|stick"
 _SURE: Final = r"position|ahrs|ekf|estimat|attitude|velocit|home|origin|altitude|\balt\b|\bdcm\b|heading|drift|height"
 
 TEXTS: Final[tuple[TextRemedy, ...]] = (
-    # words that later rows would take for their own
+    # words that later rows would match as well
     _row("configuration", "Check the scripts on the SD card of the autopilot, and its memory for them.", "script"),
     _row(
         "configuration",
@@ -108,7 +108,7 @@ TEXTS: Final[tuple[TextRemedy, ...]] = (
     _row("compass", "Check the cable of the compass and its settings.", _COMPASS, f"{_BROKEN}|found"),
     _row(
         "compass",
-        "Move the vehicle away from metal and magnets. Calibrate the compass if this stays.",
+        "Move the vehicle away from metal and magnets. Calibrate the compass if this persists.",
         rf"{_COMPASS}|magnetic",
     ),
     _row("gps", "Move away from what disturbs the GPS receiver, and wait for a fix.", _GPS, "jam|spoof|interference"),
@@ -126,13 +126,13 @@ TEXTS: Final[tuple[TextRemedy, ...]] = (
     ),
     _row(
         "sensors",
-        "Keep the vehicle still until it is warm, then restart it. Calibrate the sensor if this stays.",
+        "Keep the vehicle still until it is warm, then restart it. Calibrate the sensor if this persists.",
         _IMU,
         "inconsistent|bias",
     ),
-    _row("sensors", "Restart the autopilot. Have it checked if this stays.", rf"{_IMU}|baro|absolute_pressure"),
-    _row("sensors", "Wait a minute without moving it. Restart the autopilot if this stays.", "disparity"),
-    _row("surroundings", "Move what is near the vehicle away.", r"proximity", r"want|\bdeg\b"),
+    _row("sensors", "Restart the autopilot. Have it checked if this persists.", rf"{_IMU}|baro|absolute_pressure"),
+    _row("sensors", "Wait a minute without moving it. Restart the autopilot if this persists.", "disparity"),
+    _row("surroundings", "Move nearby objects away from the vehicle.", r"proximity", r"want|\bdeg\b"),
     _row(
         "sensors",
         "Check the cable, the power and the settings of this sensor.",
@@ -160,7 +160,7 @@ TEXTS: Final[tuple[TextRemedy, ...]] = (
         r"\bgcs\b|ground (control )?station|communication_links|data.?link|mission computer|companion",
     ),
     # the plan
-    _row("mission", "Connect the ground station and wait for the data of the terrain.", "terrain"),
+    _row("mission", "Connect the ground station and wait for the terrain data.", "terrain"),
     _row(
         "surroundings",
         "Bring the vehicle inside its fence.",

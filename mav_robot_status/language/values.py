@@ -117,7 +117,7 @@ def look(field: str, value: object) -> Look:
 
 
 def style_sheet() -> str:
-    """The colours of the tones as CSS: a property of the page for each, and `--tone` of an element of that class.
+    """The colours of the tones as CSS: a property of the page for each tone, `--tone` for the elements of its class.
 
     Paper is light.
     """

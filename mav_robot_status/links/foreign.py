@@ -33,7 +33,7 @@ WORDS: Final = {
     "file": _FILE,
     "tlogreader": _FILE,
 }
-"""By scheme. `place` is the HOST:PORT behind the scheme, or an example; `rest` all that is behind it."""
+"""By scheme. `place` is the HOST:PORT after the scheme, or an example; `rest` is everything after the scheme."""
 
 
 def what_it_is(text: str, scheme: str) -> str:

@@ -31,7 +31,7 @@ def network(kind: LinkKind, text: str, rest: str, baud: int | None = None) -> Ur
         _explain_mavros(text, kind, rest)
     place, question, _ = rest.partition("?")
     if question:
-        raise UsageError(f"{text!r}: options behind '?' are those of another program; write {kind.schemes[0]}:{place}")
+        raise UsageError(f"{text!r}: options after '?' belong to another program; write {kind.schemes[0]}:{place}")
     if kind.listens and rest.isascii() and rest.isdigit():
         rest = f":{rest}"
     found = _HOST_PORT.fullmatch(rest.rstrip("/"))

@@ -28,7 +28,7 @@ class Url(NamedTuple):
     """Without brackets; empty for a kind without a host."""
     port: int
     device: str
-    """The path of a serial device or of a log; for a kind from another package the text behind the scheme."""
+    """The path of a serial device or of a log; for a kind from another package the text after the scheme."""
     baud: int
     """Bits per second; 0 unless the kind is serial."""
     text: str
@@ -48,7 +48,7 @@ class LinkKind(NamedTuple):
 
     name: str
     schemes: tuple[str, ...]
-    """What may stand before the first colon of a connection string, with or without `//` behind it."""
+    """What may stand before the first colon of a connection string, with or without `//` after it."""
     forms: str
     """The connection strings of this kind, for the help: `udp:H:P  udpin:H:P`."""
     words: str
@@ -60,8 +60,8 @@ class LinkKind(NamedTuple):
     opener: str | Callable[[Url], Link]
     """Opens the link, or `module:callable` to import it when a link is opened. Raises LinkError or OSError."""
     read: Callable[[LinkKind, str, str, int | None], Url] | None = None
-    """Makes the Url of the kind, the whole text, the text behind the scheme, and the baud rate of the command line.
-    Raises UsageError. None: the text behind the scheme becomes `Url.device`."""
+    """Makes the Url from the kind, the whole text, the text after the scheme, and the baud rate of the command line.
+    Raises UsageError. None: the text after the scheme becomes `Url.device`."""
     transport: str = ""
     """`udp`, `tcp`, `serial` or `file`, for what `doctor` examines; empty: `doctor` examines nothing."""
     listens: bool = False
@@ -82,7 +82,7 @@ class LinkKind(NamedTuple):
         return self.transport == "serial"
 
     def url(self, text: str, rest: str, baud: int | None) -> Url:
-        """What `text` means. `rest` is the part behind the scheme. Raises UsageError."""
+        """What `text` means. `rest` is the part after the scheme. Raises UsageError."""
         if self.read is None:
             return Url(self, "", 0, rest, 0, text)
         return self.read(self, text, rest, baud)

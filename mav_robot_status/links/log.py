@@ -151,7 +151,7 @@ class LogReader:
     """The bytes of a recorded log, in blocks. A log may be larger than the memory, or come from a pipe."""
 
     def __init__(self, path: str) -> None:
-        """Open it and read its head. Raises UsageError, one line: not there, not a file, empty, of another kind."""
+        """Open it and read its head. Raises UsageError if it is missing, empty, not a file, or of another kind."""
         self.path = path
         try:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)

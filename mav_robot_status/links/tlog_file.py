@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 CHUNK: Final = 1 << 16
 """The most bytes of one write, except for a longer record."""
 TAIL: Final = 1 << 16
-"""Bytes at the end of a file in which the last whole record is searched."""
+"""Bytes at the end of a file that are searched for the last whole record."""
 MODE: Final = 0o640
 """Permissions of a new file: a recording shows where people live. A file that exists keeps its own."""
 MAX_RECORD: Final = 8 + 10 + 255 + 2 + 13

@@ -236,7 +236,7 @@ class UdpSender(UdpLink):
             self._due = -math.inf
 
     def may_answer(self, source: Address, current: Address, silent: float) -> bool:
-        """Whether this address may answer. `current` answered until `silent` seconds ago; None: nobody did yet."""
+        """Whether this address may answer. `current` last answered `silent` seconds ago; None: no address has."""
         return current is None or silent > OTHER_SILENCE or self._nearness(source) > self._nearness(current)
 
     def answered(self, source: Address) -> None:
@@ -245,7 +245,7 @@ class UdpSender(UdpLink):
             log.info("%s: %s answers", self.text, host_port(*source[:2]))
 
     def _nearness(self, source: Address) -> int:
-        """How much of the address of the target this one has: EXACT, its host, or nothing."""
+        """How much this address has in common with the target: everything (EXACT), the host, or nothing."""
         if not isinstance(source, tuple) or self._peer is None or source[0] != self._peer[0]:
             return 0
         return EXACT if source[1] == self._peer[1] else 1

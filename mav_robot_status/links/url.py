@@ -20,7 +20,7 @@ _SCHEME = re.compile(r"([A-Za-z][\w+-]*):(?://)?(.*)", re.ASCII | re.DOTALL)
 _PORT_ALONE = re.compile(r":[0-9]+", re.ASCII)
 _GLUED = re.compile(r"([A-Za-z]+)([0-9]+(?:\.[0-9]+){3})", re.ASCII)
 NEARLY = 0.86
-"""How similar (1: equal) a host and a scheme are at least if the host is taken for a misspelt scheme."""
+"""A host that is more similar to a scheme than this (1: equal) is taken for a misspelt scheme."""
 _EXAMPLES = ", ".join(kind.example for kind in (UDP_LISTENER, SERIAL, LOG))
 
 

@@ -4,7 +4,7 @@ It drops a datagram only if that is one whole frame of an id that is not wanted,
 passes everything else: several frames in one datagram, a part of a frame, other bytes. It does not check the CRC.
 
 The format: https://www.kernel.org/doc/Documentation/networking/filter.txt. On a UDP socket offset 0 is the UDP header.
-A load behind the end of the datagram would drop it, so the length is compared first. Jumps go forward, and those with a
+A load beyond the end of the datagram would drop it, so the length is compared first. Jumps go forward, and those with a
 condition by at most 255 instructions.
 """
 
@@ -25,7 +25,7 @@ MOST_INSTRUCTIONS: Final = 4096
 """The limit of the kernel."""
 LONGEST_JUMP: Final = 255
 AT_ONCE: Final = 4
-"""So few ids are compared one after another; more are divided first."""
+"""Up to this many ids are compared one after another; a longer list is halved first."""
 
 LOAD_BYTE, LOAD_WORD, LOAD_LENGTH, TO_X = 0x30, 0x20, 0x80, 0x07
 ADD, AND, JUMP, IF_EQUAL, IF_EQUAL_X, IF_AT_LEAST, RETURN = 0x04, 0x54, 0x05, 0x15, 0x1D, 0x35, 0x06

@@ -35,14 +35,14 @@ CHECK: Final = 24
 """Bytes that must have been read for each check of a place at which a frame may start. Random bytes have one such place
 in 350 bytes. Where there are many more, a search looks at some of them only."""
 SKIP: Final = 12
-"""Bytes that must have been read for each skipped frame without a valid CRC. The shortest frame of MAVLink 2 has as
-many, so frames of an unknown dialect are always skipped whole."""
+"""Bytes that must have been read for each skipped frame without a valid CRC. The shortest frame of MAVLink 2 is as
+long, so frames of an unknown dialect are always skipped whole."""
 MOST_CREDIT, FIRST_CREDIT = 6144, 768
-"""Unspent bytes that are kept for later checks, and those that a new parser has. A damaged frame may consist of places
+"""The most unspent bytes kept for later checks, and how many a new parser has. A damaged frame may consist of places
 at which a frame may start; all of them are checked. A new parser has fewer, because each new address gets a parser."""
 NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; a lookup is faster than the arithmetic
 VALID, WRONG = 0, -1
-new = tuple.__new__  # makes a NamedTuple of a tuple in a third of the time of its constructor
+new = tuple.__new__  # makes a NamedTuple from a tuple in a third of the time of its constructor
 
 
 class Frame(NamedTuple):
@@ -314,7 +314,7 @@ class Parser:
         """The first start of a valid frame in a range, or -1; and the places before it that are not decided yet.
 
         Those are pairs: the start of a frame, and how long the data must be to decide. `known` are such places before
-        the range; they are paid for. If a check cannot be paid for, the search goes on where it can.
+        the range; they are paid for. If a check cannot be paid for, the search continues where one can be.
         """
         size = len(data)
         open_: list[tuple[int, int]] = []

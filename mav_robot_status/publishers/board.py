@@ -264,7 +264,7 @@ def _causes(line: Mapping[str, Any], group: str) -> dict[tuple[str, str], dict[s
     if not isinstance(causes, list):
         return {}
     found: dict[tuple[str, str], dict[str, Any]] = {}
-    for cause in causes:  # of several with one name the first text is shown
+    for cause in causes:  # if several have the same name, the text of the first is shown
         if isinstance(cause, dict):
             member = {"handle": cause["handle"]} if "handle" in cause else {}
             shown = {"name": cause.get("name"), "text": cause.get("text"), **member}

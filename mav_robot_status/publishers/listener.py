@@ -18,7 +18,7 @@ LAST_PORT: Final = 65535
 
 
 class Place(NamedTuple):
-    """Where to listen, as far as a text says it."""
+    """Where to listen: the parts that a text gives."""
 
     host: str
     """Empty if the text has none; an IPv6 address without its brackets."""

@@ -128,11 +128,11 @@ CONNECTION: Final = (
         "Messages that were held back because of speech_limit.",
         lambda c: c.withheld,
     ),
-    Family("connection_peers", GAUGE, "Ends that are spoken to.", lambda c: c.peers),
+    Family("connection_peers", GAUGE, "Peers that we send to.", lambda c: c.peers),
 )
 PUBLISHER: Final = (
     Family("publisher_queued_messages", GAUGE, "Messages held and not yet handed on.", lambda p: p.queued),
-    Family("publisher_dropped_messages_total", COUNTER, "Messages that there was no room for.", lambda p: p.dropped),
+    Family("publisher_dropped_messages_total", COUNTER, "Messages dropped for lack of room.", lambda p: p.dropped),
 )
 GATEWAY: Final = (
     Family("build_info", GAUGE, "1, with the version.", lambda m: [({"version": __version__}, 1)]),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 MOST_CHANGES: Final = 5
 WINDOW: Final = 1.0  # s
 SLACK: Final = 0.01  # s: a message this much early still counts as periodic
-LONGEST_REST: Final = 1.0  # s: no audience that is new, or asks for one status, gets an older one
+LONGEST_REST: Final = 1.0  # s: an audience that is new, or asks for one status, gets one that is no older
 
 S = TypeVar("S")
 
@@ -64,8 +64,8 @@ class Schedule:
 class RateLimitedPublisher(ABC, Generic[S]):
     """Holds the last message of each handle, and a state `S` for each handle and audience.
 
-    A new audience gets the last message of each handle at once, after a time without any with the next turn. The state
-    of a gone audience is deleted. Nothing is sent about a vehicle before its first heartbeat.
+    A new audience gets the last message of each handle at once; if there was no audience before, in the next turn. The
+    state of a gone audience is deleted. Nothing is sent about a vehicle before its first heartbeat.
     """
 
     live_only = True
@@ -133,7 +133,7 @@ class RateLimitedPublisher(ABC, Generic[S]):
             rested = self._serve([audience for audience in offered if self.wants(audience)])
             if self._audiences and not self.periodic:
                 self.periodic = True
-                if self._waiting:  # held since the last change: the pipeline first has them published again
+                if self._waiting:  # held since the last change: the pipeline first publishes them again
                     return now.mono
             self.periodic = bool(self._audiences)
             if rested and self._audiences:
@@ -154,7 +154,7 @@ class RateLimitedPublisher(ABC, Generic[S]):
         """Nothing to release."""
 
     def _serve(self, audiences: list[Audience]) -> bool:
-        """Send to these from now on. Returns whether a controller rests for the sake of the ones before."""
+        """Send to these from now on. Returns whether a controller rests because of the previous ones."""
         if audiences == self._audiences:
             return False
         rested = bool(self._rests)

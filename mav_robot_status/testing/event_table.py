@@ -112,7 +112,8 @@ def event_files(
 ) -> VehicleFiles:
     """The files of a vehicle with this table, or with any bytes as its file.
 
-    `address` is where the general file says that the table is, `uri` where COMPONENT_METADATA says that this is.
+    The general file gives `address` as the place of the table. COMPONENT_METADATA gives `uri` as the place of the
+    general file.
     """
     data = table if isinstance(table, bytes) else lzma.compress(json.dumps(table).encode())
     entry = {"type": EVENTS, "uri": address, "fileCrc": crc32(data), "uriFallback": ""}

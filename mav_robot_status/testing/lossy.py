@@ -30,7 +30,7 @@ class LossyLink(Generic[T]):
         self._held: list[T] = []
 
     def carry(self, group: Iterable[T]) -> list[T]:
-        """What arrives of this group, and what was held back of the one before."""
+        """What arrives from this group, and what was held back from the one before."""
         quality, late = self._quality, self._held
         passed: list[T] = []
         self._held = []

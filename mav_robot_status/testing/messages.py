@@ -138,7 +138,7 @@ UNTOLD = -128
 
 
 def high_latency2(s: Snapshot) -> NamedTuple:
-    """HIGH_LATENCY2: ArduPilot tells base_mode and sets a flag for a sensor that it lacks; PX4 does neither."""
+    """HIGH_LATENCY2: ArduPilot sends base_mode, and sets a flag for a sensor that it lacks; PX4 does neither."""
     f, state = s.firmware, s.state
     north, east, down = state.velocity
     lat, lon, alt = HOME if state.position else (0, 0, 0)

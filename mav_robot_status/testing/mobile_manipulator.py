@@ -30,9 +30,9 @@ class Act(NamedTuple):
     """What base and arm do at one time."""
 
     step: Step
-    """The base; its note tells of both."""
+    """The step of the base. Its note describes both."""
     arm: Callable[[FakeArm], None] | None = None
-    """None: the arm goes on."""
+    """None: the arm continues."""
 
 
 def _act(at: float, note: str, arm: Callable[[FakeArm], None] | None = None, **base: Any) -> Act:

@@ -33,7 +33,7 @@ APPLET_TICK = -2
 PREARM_REPEAT = 30.0
 """Seconds after which ArduPilot repeats why it cannot arm."""
 REPEATS_FROM = 8.0
-"""Seconds after the boot from which on a link repeats messages: earlier ones look like those of another boot."""
+"""Seconds after the boot before a link repeats messages: earlier repeats look like messages of another boot."""
 SAME_TIME = 1e-6
 """Tolerance of due times in seconds, because sums of intervals are not exact."""
 CATCH_UP = 10.0
@@ -74,7 +74,7 @@ class VehicleModel:
         self._on_step = on_step
         self._out: list[Outgoing] = []
         self._repeats: deque[tuple[float, Outgoing]] = deque()
-        """The messages that the link repeats, with the times when it does."""
+        """The messages that the link will repeat, each with its time."""
         self._now = start
         self._unix_us = 0
         self._schedule: list[tuple[float, Step]] = []

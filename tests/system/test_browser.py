@@ -160,7 +160,7 @@ def test_a_lost_link_says_since_when_and_what_was_last_known(
     browser.wait(f"{WORD} === 'CANNOT MOVE'")
     rover.beating(False)
     browser.wait(f"{WORD} === 'LOST'")
-    assert "Nothing is known since " in browser.text("#verdict")
+    assert "Unknown since " in browser.text("#verdict")
     assert "It may be moving. Last known: MANUAL" in browser.text("#verdict")
     assert "why this is unknown" in browser.text("#causes").lower()
     assert "motion" not in browser.text("#causes").lower()
@@ -170,7 +170,7 @@ def test_a_lost_link_says_since_when_and_what_was_last_known(
     assert "line-through" not in browser.ask(f"return {struck}")
     browser.driver.get(f"{url(gate)}/#?all")
     browser.wait("document.querySelector('#rows .state')?.innerText === 'LOST'")
-    assert "Nothing is known since " in browser.text("#rows .why-cell")
+    assert "Unknown since " in browser.text("#rows .why-cell")
 
 
 def test_a_loss_ends_no_error_in_the_list_of_changes(browser: Browser, page: Page) -> None:

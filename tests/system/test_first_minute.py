@@ -57,7 +57,7 @@ def test_udpclient_speaks_first(gateway: Callable[..., Gateway], ended: contextl
             ["udp:14550", "--out", "udpin:127.0.0.1:14550"],
             "udp port 14550 is given twice, as udp:14550 and as udpin:127.0.0.1:14550; leave one out, or write another",
         ),
-        (["udp:14550", "--name", "1=a", "--name", "1=b"], "--name 1= is there twice: one vehicle has one name"),
+        (["udp:14550", "--name", "1=a", "--name", "1=b"], "--name 1= is given twice: one vehicle has one name"),
     ],
 )
 def test_a_wrong_argument_is_one_line_that_says_what_to_write(arguments: list[str], line: str) -> None:

@@ -86,7 +86,7 @@ def test_at_the_real_rates_the_age_grows_to_the_next_message_and_the_link_lasts(
 def test_doctor_says_what_it_means(tmp_path: Path) -> None:
     done = run("doctor", satellite_log(ardurover.SATELLITE, 30, tmp_path))
     assert done.returncode == 0
-    assert "1.1 is heard by HIGH_LATENCY2 only" in done.stdout
+    assert "1.1 is heard only through HIGH_LATENCY2" in done.stdout
     assert "[high-latency]" in done.stdout
     assert "rates: HIGH_LATENCY2 0.2 Hz" in done.stdout
     assert "missing:" not in done.stdout

@@ -72,7 +72,7 @@ def test_a_lost_robot_may_be_moving_and_nothing_of_it_is_known(
     screen.wait_for_text("1 robot ")
     rover.beating(on=False)
     screen.wait_for_text("lost vehicle 1.1: no heartbeat for 3.5 s")
-    screen.wait_for(lambda lines: "✗ LOST" in row(screen) and "Nothing is known since " in row(screen), "a lost link")
+    screen.wait_for(lambda lines: "✗ LOST" in row(screen) and "Unknown since " in row(screen), "a lost link")
     screen.wait_for_text("It may be moving.")
     screen.wait_for_text("Last known: ")
     screen.wait_for_text("1 not heard")

@@ -136,13 +136,13 @@ def behind_satellite(f: Findings) -> str:
 
 
 def run(f: Findings) -> str:
-    """The command that publishes the statuses, and how to know more."""
+    """The command that publishes the statuses, and advice to install the applet if it would help."""
     command = f"mav-robot-status {f.url.text}" + (" --passive" if f.passive and not f.url.kind.is_log else "")
     return command + (APPLET_ADVICE if any(s.needs_applet for s in f.vehicles) else "")
 
 
 def available(f: Findings) -> str:
-    """That a status is available; of a log that ends in silence, when its vehicles were heard."""
+    """Says that a status is available; for a log that ends in silence, when its vehicles were heard."""
     if not any(s.silent for s in f.vehicles):
         return "a status is available"
     first, *others = f.vehicles
@@ -158,7 +158,7 @@ def _end(silence: float) -> str:
 
 
 def look(f: Findings) -> str:
-    """The next command for a connection without a fault: of a log that ends in silence, the last status."""
+    """The next command for a connection without a fault; for a log that ends in silence, it shows the last status."""
     last = max((s.silent.until_us for s in f.vehicles if s.silent), default=None)
     if last is None or not all(s.silent for s in f.vehicles):
         return run(f)
@@ -166,7 +166,7 @@ def look(f: Findings) -> str:
 
 
 def others_only(f: Findings) -> str:
-    """That no autopilot is heard, but somebody else."""
+    """Says that no autopilot is heard, and who is heard instead."""
     if f.url.kind.is_log:
         return f"the log has no heartbeat of an autopilot, only {named_all(f.speakers)}"
     return f"no autopilot is heard, only {named_all(f.speakers)}"

@@ -154,7 +154,7 @@ ARM_CASES: Final = (
     ArmCase("not-understood", "the controller answers, but not as expected",
             lambda f: f.fault,
             lambda f: f"{f.where}: {f.fault}",
-            lambda f: "end other clients of the controller; if it stays, restart the controller"),
+            lambda f: "end other clients of the controller; if the fault remains, restart the controller"),
     ArmCase("incomplete", "bytes arrive, but less than a whole answer: half a frame, or too slow",
             lambda f: f.size,
             lambda f: f"{f.size} bytes arrived from {f.where}, then {f.waits_for} did not",

@@ -120,7 +120,7 @@ def _known(interface: HardwareConfig) -> tuple[ArmFindings, Talk | None]:
 
 
 def _listen(config: Config, base: ArmFindings, seconds: float, clock: Callable[[], Instant]) -> ArmFindings:
-    """Run the gateway until a status is there and settled, or until the time is over."""
+    """Run the gateway until a status has arrived and settled, or until the time is up."""
     gateway = EventLoop(config, NO_OUTPUT, clock)
     start = clock().mono
     heard: list[float] = []
@@ -166,6 +166,6 @@ def ask_again(found: ArmFindings, talk: Talk, answer: float = ANSWER) -> ArmFind
                 controller.sendall(talk.ask())
     except FAULTS as error:
         fault = str(error)
-    except OSError:  # it is silent, or has closed the connection: what arrived tells more
+    except OSError:  # it is silent, or has closed the connection: the bytes that arrived say more
         pass
     return dataclasses.replace(found, size=size, head=head, fault=fault, waits_for=talk.waits_for)

@@ -34,7 +34,7 @@ MOST_SPEAKERS: Final = 256
 MOST_KINDS: Final = 4
 """Limit of the kinds and boot times stored for one autopilot."""
 RETURNS: Final = 2
-"""Returns to an earlier boot time that prove two autopilots. A reboot never returns to one."""
+"""This many returns to an earlier boot time prove two autopilots. A reboot never returns to one."""
 YEAR_2020_US: Final = 1_577_836_800_000_000
 """Earlier times are invalid: a vehicle without GPS starts at 1970."""
 
@@ -203,7 +203,7 @@ class _Component:
     def _conflict(self) -> str:
         if self._swaps:
             kinds = (f"{named(mav.AUTOPILOT_NAMES, a)} {named(mav.TYPE_NAMES, t)}" for a, t in sorted(self.kinds))
-            return "heartbeats in turns of " + " and of ".join(kinds)
+            return "heartbeats that alternate between " + " and ".join(kinds)
         if self._returns >= RETURNS:
-            return f"clocks in turns that started {max(self._boots) - min(self._boots):.0f} s apart"
+            return f"alternating clocks that started {max(self._boots) - min(self._boots):.0f} s apart"
         return ""

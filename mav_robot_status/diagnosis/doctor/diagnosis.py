@@ -191,7 +191,7 @@ CASES: Final = (
     Case("nobody-connects", "a TCP server here, and nothing arrives",
          _silent("tcp", listens=True),
          lambda f: f"no client connected and sent data within {f.seconds:.1f} s",
-         lambda f: f"let the other end connect to {own(f)}, and the firewall here pass TCP port {f.url.port}"),
+         lambda f: f"let the other end connect to {own(f)}, and let the firewall here pass TCP port {f.url.port}"),
     Case("serial-silent", "no byte arrives from the serial device",
          _silent("serial"),
          lambda f: f"no byte arrived from {f.url.device} within {f.seconds:.1f} s",
@@ -234,8 +234,8 @@ CASES: Final = (
          spoils=True),
     Case("signed", "the frames are signed, and there is no key",
          lambda f: f.counters.signed and not f.signing,
-         lambda f: f"{f.counters.signed} of {f.counters.frames} frames are signed: they are not verified, and what we "
-         "ask unsigned is ignored",
+         lambda f: f"{f.counters.signed} of {f.counters.frames} frames are signed: they are not verified, and our "
+         "unsigned requests are ignored",
          lambda f: "give the key with --signing-key FILE"),
     Case("few-heartbeats", "an autopilot is heard, but its heartbeats are too few",
          _seldom,
@@ -249,8 +249,9 @@ CASES: Final = (
     # a status is available
     Case("high-latency", "the vehicle sends only HIGH_LATENCY2, as behind a satellite",
          _by_high_latency,
-         lambda f: f"a status is available, but {_by_high_latency(f)[0].ids} is heard by HIGH_LATENCY2 only: e_stopped "
-         "and rest are never known, armed only of an ArduPilot, and the status is as old as link.heartbeat_age",
+         lambda f: f"a status is available, but {_by_high_latency(f)[0].ids} is heard only through HIGH_LATENCY2: "
+         "e_stopped and rest are never known, armed is known only for an ArduPilot, "
+         "and the status is as old as link.heartbeat_age",
          behind_satellite),
     Case("mavlink-1", "the vehicle uses MAVLink 1: no extension fields, and no message ids over 255",
          _old,
@@ -260,7 +261,7 @@ CASES: Final = (
          _off,
          lambda f: f"a status is available, but the clocks of {_off(f)[0].ids} and of this computer, which stamps the "
          f"lines, differ by {abs(_off(f)[0].clock_off or 0):.0f} s",
-         lambda f: "set this computer's clock (timedatectl set-ntp true), unless it is the vehicle's that is wrong"),
+         lambda f: "set this computer's clock (timedatectl set-ntp true), unless the vehicle's clock is the wrong one"),
     Case("ok", "a status is available",
          lambda f: True, available, look),
 )  # fmt: skip

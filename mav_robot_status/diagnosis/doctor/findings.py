@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 HEARTBEAT, SYS_STATUS, HIGH_LATENCY2 = 0, 1, 235
 GROUND_STATION: Final = 6  # MAV_TYPE
 SAME_ID: Final = 3
-"""Bad frames of an id, without a good one, from which on its definition is suspected instead of noise."""
+"""This many bad frames of an id, without a good one, suggest another definition instead of noise."""
 LEAST_HEARTBEATS: Final = 2
 
 
@@ -79,7 +79,7 @@ class VehicleStatus(NamedTuple):
     firmware: str | None = None
     """The version of its firmware."""
     costly: bool = False
-    """Whether it is heard by HIGH_LATENCY2 alone."""
+    """Whether it is heard only through HIGH_LATENCY2."""
     name: str | None = None
     """What people call it."""
     can_run_applet: bool = False
@@ -142,12 +142,12 @@ class Speaker(NamedTuple):
 
     @property
     def seldom(self) -> bool:
-        """Whether it is a vehicle that is heard by HIGH_LATENCY2 alone."""
+        """Whether it is a vehicle that is heard only through HIGH_LATENCY2."""
         return self.status is not None and self.status.costly
 
     @property
     def needs_applet(self) -> bool:
-        """Whether the applet is not heard, and would make a known `e_stopped` of an unknown one."""
+        """Whether the applet is not heard, and would make an unknown `e_stopped` known."""
         status = self.status
         if status is None or not status.can_run_applet or (self.applet is not None and self.applet.fresh):
             return False
@@ -155,7 +155,7 @@ class Speaker(NamedTuple):
 
     @property
     def silent(self) -> Heard | None:
-        """When it was heard, if the log ends in its silence."""
+        """When it was heard, if it is silent when the log ends."""
         return self.heard if self.heard is not None and self.heard.silence else None
 
     @property

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ...interface import IndustrialRobotStatusHandle, IndustrialRobotStatusInterface
 
 FRESH: Final = 1.5
-"""Seconds after a heartbeat in which a status counts as that of the heartbeat. Later it becomes unknown, bit by bit."""
+"""Seconds for which a status counts as that at the latest heartbeat. Then its fields become unknown one by one."""
 
 
 class LastStatus(NamedTuple):
@@ -33,7 +33,7 @@ class Heard(NamedTuple):
     seconds: float
     """The time in which it was heard, without its silences."""
     times: int
-    """The number of times it came back, and 1."""
+    """One more than the number of times it came back."""
     until_us: int
     """Its last heartbeat, in Unix microseconds."""
     silence: float

@@ -29,7 +29,7 @@ class Ros2Findings(NamedTuple):
     trouble: str | None = None
     """Why the network cannot be reached."""
     subscriptions: tuple[Endpoint, ...] = ()
-    """Those of our types or to a topic of our name, in every domain."""
+    """The subscriptions in every domain that have one of our types, or a topic with our name."""
 
     @property
     def here(self) -> tuple[Endpoint, ...]:
@@ -71,7 +71,7 @@ CASES: Final = (
              lambda f: f"nobody subscribes in domain {f.settings.domain}, but somebody does in domain "
              f"{f.subscriptions[0].domain}",
              lambda f: f"write zenoh://{f.settings.host}:{f.settings.port}/{f.subscriptions[0].domain}"),
-    Ros2Case("ros2-no-subscriber", "nobody subscribes yet; the topics can be had", True,
+    Ros2Case("ros2-no-subscriber", "nobody subscribes yet; the topics are available", True,
              lambda f: not f.here,
              lambda f: f"it can be reached, but nobody subscribes in domain {f.settings.domain}",
              lambda f: f"{_echo(f)}, on the computer that should show it"),

@@ -98,7 +98,7 @@ def _found(facts: Facts, options: HardwareOptions, mode: FlightMode) -> tuple[Fi
 def _seldom(
     told: Seldom, facts: Facts, options: HardwareOptions, mode: FlightMode
 ) -> tuple[Finding, Finding, Finding, Finding]:
-    """The same of a vehicle that is heard by HIGH_LATENCY2 alone."""
+    """The same for a vehicle that is heard only through HIGH_LATENCY2."""
     drives = high_latency.drives_powered(told, facts, options)
     possible = high_latency.motion_possible(facts, options, mode, drives)
     return high_latency.e_stopped(options), drives, possible, high_latency.in_motion(told)

@@ -107,7 +107,7 @@ class SystemStatus(NamedTuple):
     rc_lost_with_state: bool
     """Whether the RC receiver was lost when the vehicle entered its state."""
     unhealthy: int
-    """What a disarmed PX4 reports as enabled and unhealthy, the extended word shifted up by 32. 0 of others."""
+    """What a disarmed PX4 reports as enabled and unhealthy, the extended word shifted up by 32. Otherwise 0."""
 
 
 class Cause(NamedTuple):
@@ -149,7 +149,7 @@ class Claimed(NamedTuple):
 
 
 class Seldom(NamedTuple):
-    """What HIGH_LATENCY2 tells beside the mode."""
+    """What HIGH_LATENCY2 says besides the mode."""
 
     armed: TriState
     moves: bool
@@ -198,7 +198,7 @@ class Facts(NamedTuple):
     heartbeat: Heartbeat
     """The latest one, or what a HIGH_LATENCY2 says instead."""
     seldom: Seldom | None
-    """What HIGH_LATENCY2 tells, if the vehicle sends no HEARTBEAT. None: it does."""
+    """What HIGH_LATENCY2 says, if the vehicle sends no HEARTBEAT. None: it sends HEARTBEATs."""
     state_since: int
     """When it entered its MAV_STATE, Unix microseconds."""
     fresh: Fresh

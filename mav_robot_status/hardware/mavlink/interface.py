@@ -497,7 +497,7 @@ class MavlinkRobotHW(RobotHW):
         return None
 
     def _is_heard_elsewhere(self, tracked: TrackedVehicle, frame: Values, now: Instant, way: Any) -> bool:
-        """Whether a frame counts that is not from the selected way: a heartbeat that selects its way."""
+        """Whether a frame that is not from the selected way counts: only a heartbeat that selects its way does."""
         message_id, ids, sequence, message, _, _ = frame
         claims, state = tracked.claims, tracked.state
         if claims.mine is None:
@@ -558,7 +558,7 @@ class MavlinkRobotHW(RobotHW):
     def _look_again(self, until: float) -> TrackedVehicle | None:
         """Postpone the first deadlines at which the facts do not change, because messages kept arriving.
 
-        Returns the vehicle of the first deadline up to `until` at which they do; None if there is none.
+        Returns the vehicle of the first deadline up to `until` at which the facts change; None if there is none.
         """
         while self._due.first <= until:
             tracked = self._due.first_key()
@@ -653,7 +653,7 @@ class MavlinkRobotHW(RobotHW):
             if tracked.requests is not None:
                 tracked.requests.look_again(tracked.moment.now)
         else:
-            log.info("vehicle %d.%d is heard by HIGH_LATENCY2 only: nothing is sent to it", *ids)
+            log.info("vehicle %d.%d is heard only through HIGH_LATENCY2: nothing is sent to it", *ids)
 
     def _log_link(self, tracked: TrackedVehicle, state: LinkState) -> None:
         before = tracked.handle.detail.link

@@ -24,7 +24,7 @@ ARM_STATUS_ID: Final = mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_ARM_STATUS
 COMMAND_IDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_INT, mavlink.MAVLINK_MSG_ID_COMMAND_LONG})
 """Messages from other senders."""
 HIGH_LATENCY_ID: Final = mavlink.MAVLINK_MSG_ID_HIGH_LATENCY2
-"""Says what a HEARTBEAT says, so it first has to pass for its sender."""
+"""It says what a HEARTBEAT says, so its sender is checked first."""
 METADATA_ID: Final = mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA
 FILE_ID: Final = mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
 FILE_IDS: Final = frozenset({METADATA_ID, FILE_ID})

@@ -13,7 +13,7 @@ from typing import Final
 log = logging.getLogger(__name__)
 
 SECONDS: Final = 3
-"""In so many different seconds of a WINDOW a newcomer must have sent a HEARTBEAT."""
+"""A newcomer must have sent a HEARTBEAT in this many different seconds of a WINDOW."""
 WINDOW: Final = 10.0
 LOG_PERIOD: Final = 60.0  # s between two log lines
 PAIRS: Final = 1 << 16

@@ -48,7 +48,7 @@ class Places:
     ) -> None:
         """`slots`: the vehicles of the configuration. Without one, every autopilot gets a place and a handle.
 
-        A name in `names` goes before the name of a slot.
+        A name in `names` takes precedence over the name of a slot.
         """
         self._names = names
         # exact ids match before open ones
@@ -78,7 +78,7 @@ class Places:
         return tracked
 
     def give(self, tracked: TrackedVehicle, ids: Ids) -> None:
-        """These ids to a vehicle, instead of those that it had."""
+        """Give these ids to a vehicle in place of those that it had."""
         if tracked.ids is not None:
             del self.tracked[tracked.ids]
             self._claims.pop(tracked.ids, None)
@@ -90,7 +90,7 @@ class Places:
     def room_for(self, ids: Ids, now: float, options: HardwareOptions) -> list[TrackedVehicle] | None:
         """Whether a vehicle with these ids that sends its first HEARTBEAT gets a place.
 
-        None: it gets none. Else the vehicles that give up theirs for it: `remove` them.
+        None: it gets no place. Otherwise the vehicles that give up their place for it: `remove` them.
         """
         if any(t.matches(*ids) for t in self.expected):
             return []
@@ -158,6 +158,6 @@ def handle_name(ids: Ids) -> str:
 
 
 def _gives_way(tracked: TrackedVehicle, now: float, options: HardwareOptions) -> bool:
-    """Whether it gives its place to another: it is silent. One HIGH_LATENCY2 keeps no place for a minute."""
+    """Whether it is silent, and gives up its place. One HIGH_LATENCY2 is not enough to keep a place for a minute."""
     briefly = tracked.costly and not tracked.has_lasted
     return now - tracked.last_heard > (options.heartbeat_timeout if briefly else tracked.timeout(options))

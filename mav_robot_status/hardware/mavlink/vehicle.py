@@ -88,7 +88,7 @@ class TrackedVehicle:
         self.dirty = False
         """Whether the next `read` evaluates it."""
         self.connected = False
-        """Whether the heartbeat was fresh at the last evaluation. Only then a deadline is that of all facts."""
+        """Whether the heartbeat was fresh at the last evaluation. Only then does the deadline cover all facts."""
         self.moment = Moment(-math.inf)
         """The time of the last evaluation. Its `next` is the deadline: until then only a message changes the facts."""
         self.deadline = math.inf
@@ -96,7 +96,7 @@ class TrackedVehicle:
 
     @property
     def costly(self) -> bool:
-        """Whether it is heard by HIGH_LATENCY2 alone. Its link charges for each byte, so nothing is sent to it."""
+        """Whether it is heard only through HIGH_LATENCY2. Its link charges for each byte, so nothing is sent to it."""
         return self.state is not None and self.state.high_latency is not None
 
     @property
@@ -107,7 +107,7 @@ class TrackedVehicle:
 
     @property
     def has_lasted(self) -> bool:
-        """Whether it was heard for a while since the link was lost last."""
+        """Whether it has been heard for a while since the last link loss."""
         return self.state is not None and self.last_heard - self.state.heartbeats.since.mono >= ESTABLISHED
 
     def timeout(self, options: HardwareOptions) -> float:

@@ -98,7 +98,7 @@ class SimpleMessageRobotHW(RobotHW):
         self._robot.detail = Detail(link=LinkState.NEVER_SEEN)
 
     def _begin(self, now: Instant) -> None:
-        """Nothing of the connection before counts for a new one."""
+        """Start afresh on a new connection: nothing of the old one counts."""
         if self._source is not None and self._source.is_new():
             self._reader, self._frame_by = StatusReader(self._byte_order), now.mono + SILENCE
 
@@ -114,7 +114,7 @@ class SimpleMessageRobotHW(RobotHW):
             self._frame, self._robot.heard_at, self._frame_by = frames[-1], now.mono, now.mono + SILENCE
 
     def _give_up(self, why: str, now: Instant) -> None:
-        """The connection is of no use. If it has ended, the link has said so."""
+        """The connection is of no use. If it has already ended, the link has logged that."""
         self._frame_by = math.inf
         if self._source is not None and self._source.link.connected:
             self._log.fault(why, now.mono)

@@ -46,7 +46,7 @@ class UrOptions(Options):
     host: Annotated[str, Option("the controller")]
     port: Annotated[float, Option("RTDE port", low=1, high=65535)] = 30004
     dashboard_port: Annotated[float, Option("port of the dashboard server", low=1, high=65535)] = 29999
-    assume_mode: Annotated[str, Option("the mode where the dashboard does not tell", choices=tuple(ASSUMED))] = "none"
+    assume_mode: Annotated[str, Option("the mode if the dashboard does not report it", choices=tuple(ASSUMED))] = "none"
 
 
 class UrRobotHW(RobotHW):
@@ -71,7 +71,7 @@ class UrRobotHW(RobotHW):
         self._joints = Joints()
         self._name, self._log = context.name, FaultLog(context.name)
         self._missing: tuple[str, ...] = ()
-        """The values that a log line has said are missing."""
+        """The missing values that were last logged."""
         self._rtde: TcpSource | None = None
         self._dash: TcpSource | None = None
         if not context.replay:
@@ -135,7 +135,7 @@ class UrRobotHW(RobotHW):
             rtde.send(out)
 
     def _give_up(self, why: str, now: Instant) -> None:
-        """Nothing more of this connection counts. If it has ended, the link has said so."""
+        """Nothing more of this connection counts. If it has already ended, the link has logged that."""
         self._session, self._sample_by = None, math.inf
         if self._rtde is not None and self._rtde.link.connected:
             self._log.fault(why, now.mono)

@@ -66,7 +66,7 @@ class Stop(NamedTuple):
     code: int = 0
     """The error code; 0: not an error."""
     beside: int = 0
-    """Bits that explain it: with one of them it has no row of its own."""
+    """Bits that explain it: if one of them is set, this stop is not listed."""
 
 
 STOPS: Final = (
@@ -83,12 +83,12 @@ NOT_RUNNING: Final = {
     -1: ("NO_CONTROLLER", "no controller"),
     0: ("DISCONNECTED", "the arm is not connected to its controller"),
     1: ("CONFIRM_SAFETY", "a person must confirm the safety configuration"),
-    2: ("BOOTING", "the controller boots"),
+    2: ("BOOTING", "the controller is booting"),
     3: ("POWER_OFF", "the arm is switched off"),
     4: ("BRAKES_ENGAGED", "powered, the brakes are engaged"),
     5: ("BRAKES_ENGAGED", "idle, the brakes are engaged"),
     6: ("BACKDRIVE", "a person moves it by hand"),
-    8: ("UPDATING_FIRMWARE", "the firmware is updated"),
+    8: ("UPDATING_FIRMWARE", "the firmware is being updated"),
 }
 """The inhibit for each robot_mode but RUNNING."""
 

@@ -47,12 +47,12 @@ REOPENINGS: Final = 3
 BURST_TRIES: Final = 2
 """Bursts without a new byte until ReadFile is used instead."""
 BURST_RATE: Final = 10_000.0
-"""Bytes a second of a link from which on bursts are used."""
+"""Bursts are used on a link with at least this many bytes a second."""
 APART: Final = 0.06
 """Seconds between two requests: together they stay below 500 bytes a second."""
 OVERHEAD: Final = 27  # bytes of a frame besides its data: header and CRC, targets, header of the payload
 MOST_DEBT: Final = 5.0
-"""Seconds from one request to the next for which the rate can delay it: a flood must not delay it for ever."""
+"""The most seconds by which the rate delays the next request: a flood must not delay it for ever."""
 SLACK: Final = 60.0  # s that a download may take besides three times its share of the rate
 MOST_GAPS: Final = 128
 HALF: Final = 0x8000
@@ -205,7 +205,7 @@ class Download:
                 self._phase = _Phase.ENDED
 
     def _answers(self, answer: Payload, asked: Payload) -> bool:
-        """Whether an answer is one to the latest request. A burst has many, with the numbers that follow."""
+        """Whether an answer belongs to the latest request. A burst has many answers, with consecutive numbers."""
         ahead = (answer.sequence - asked.sequence) & 0xFFFF
         return ahead == 1 or (asked.opcode == BURST_READ_FILE and 0 < ahead < HALF)
 
@@ -218,7 +218,7 @@ class Download:
         self._begin(_Phase.READING)
         (size,) = struct.unpack("<I", answer.data[:4].ljust(4, b"\0"))
         if not 0 < size <= self._most:
-            self._fail(f"its size is {size} bytes, and it may have 1 to {self._most}")
+            self._fail(f"its size is {size} bytes, and the limits are 1 to {self._most}")
         elif size != len(self._data):  # otherwise the session was lost: what has arrived stays
             self._data = bytearray(size)
             self._missing = [(0, size)]
@@ -275,7 +275,7 @@ class Download:
 
 
 def _without(gaps: list[tuple[int, int]], start: int, stop: int) -> list[tuple[int, int]]:
-    """The gaps without the bytes from `start` to before `stop`."""
+    """What is left of the gaps without the bytes from `start` up to `stop` (excluded)."""
     left = []
     for first, last in gaps:
         if first < min(start, last):

@@ -16,7 +16,7 @@ STEP: Final = 1000
 
 
 class TableDownload:
-    """One table. Call `due` and `heard` as of a `Download`, until `ended`.
+    """One table. Call `due` and `heard` as for a `Download`, until `ended`.
 
     `uri` and `crc` are those of COMPONENT_METADATA, `component` is the component that sent it. A hop to another
     component is not supported: PX4's files are on the autopilot.

@@ -87,7 +87,7 @@ class Fleet:
         return news
 
     def last(self, name: str) -> dict[str, Any] | None:
-        """The latest status of a robot whose link was connected, retained or not: the last that is known of it."""
+        """The latest status of a robot with a connected link, retained or not: its last known state."""
         robot = self._robots.get(name)
         return None if robot is None else robot.last
 
@@ -152,7 +152,7 @@ class Fleet:
 
 
 def _parsed(payload: bytes) -> dict[str, Any] | None:
-    """A native line whose members that readers rely on have the right types; None for anything else."""
+    """A native line in which the members that readers rely on have the right types; None for anything else."""
     line = _object(payload)
     if line is None:
         return None

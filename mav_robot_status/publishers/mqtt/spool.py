@@ -195,7 +195,7 @@ class Spool:
             self.failed = True
         else:
             if self.failed:
-                log.warning("mqtt: writes events to %s again", self._path)
+                log.warning("mqtt: writing events to %s again", self._path)
             self.failed = False
 
     def _open(self) -> sqlite3.Connection:

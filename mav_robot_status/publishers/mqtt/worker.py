@@ -57,7 +57,7 @@ class Worker:
         """Events of each robot that exceeded MOST_HANDED."""
         self._lines: Counter[str] = Counter()
         self._gone: list[str] = []
-        """Robots that are gone since the thread looked."""
+        """Robots that have gone since the thread last looked."""
         self._leaving: dict[str, Robot] = {}
         """Robots whose last publications wait for the broker."""
         self.waiting = self.dropped = 0
@@ -70,7 +70,7 @@ class Worker:
         self._thread.start()
 
     def add(self, robot: str, text: str, at: float) -> None:
-        """Add an event of a Unix time (s). It is on disk when this returns, unless the journal waited LONGEST."""
+        """Add an event; `at`: its Unix time. It is on disk when this returns, unless the journal waited LONGEST."""
         self._place += 1
         event = Event(self._place, robot, at, text)
         self._journal.append(event)

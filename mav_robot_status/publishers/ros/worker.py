@@ -126,7 +126,7 @@ class Worker:
                 self._publish(item)
 
     def _look(self) -> None:
-        """Notice a lost connection. Open one if it is time for that, and publish what was not."""
+        """Notice a lost connection. When an attempt is due, connect, and publish what was not published."""
         now = self._clock().mono
         if self._opened is None:
             if now >= self._due:
@@ -142,7 +142,7 @@ class Worker:
             self._errors.holds()
 
     def _open(self, lost: str | None = None) -> None:
-        """Connect. `lost` is why the connection before ended. Of the two reasons only the present one is logged."""
+        """Connect. `lost` is why the previous connection ended; it is logged only if the new one opens."""
         try:
             self._transport.open()
         except UnreachableError as error:
@@ -204,7 +204,7 @@ class Worker:
             self._lose(str(error))
 
     def _part(self) -> None:
-        """Publish the remaining messages, then that nothing is known any more: ROS keeps no last message for others."""
+        """Publish the remaining messages, then unknown statuses: ROS keeps no last message for others."""
         self._serve(self._take())
         now = self._clock()
         for msg in list(self._latest.values()):

@@ -1,4 +1,4 @@
-"""ROS 2 over Zenoh, for rmw_zenoh: a client of the router that `rmw_zenohd` is.
+"""ROS 2 over Zenoh, for rmw_zenoh: a client of the router `rmw_zenohd`.
 
 Zenoh keeps quiet: it logs only if a program asks for it. Its own threads do the I/O, and it reconnects by itself within
 a second or so, and declares the tokens again. A longer loss ends the session, and the worker opens another one.

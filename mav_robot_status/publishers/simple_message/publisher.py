@@ -68,7 +68,7 @@ class SimpleMessagePublisher:
         return self._look_at
 
     def forget(self, handle: str) -> None:
-        """Send the last status of this handle to nobody any more."""
+        """Stop sending the last status of this handle to new clients."""
         self._latest = b""
 
     def close(self) -> None:

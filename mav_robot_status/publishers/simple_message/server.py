@@ -26,7 +26,7 @@ CHUNK: Final = 4096
 MOST_WAITING: Final = 1 << 16
 """Bytes that wait for a client. With one more it counts as a client that does not read."""
 KERNEL_BUFFER: Final = 1 << 13
-"""Bytes that the kernel buffers besides, in each direction. Linux doubles this."""
+"""Bytes that the kernel buffers in addition, in each direction. Linux doubles this."""
 SOCKET_OPTIONS: Final = (
     (socket.SOL_SOCKET, socket.SO_SNDBUF, KERNEL_BUFFER),
     (socket.SOL_SOCKET, socket.SO_RCVBUF, KERNEL_BUFFER),
@@ -53,7 +53,7 @@ class Client:
         """What the kernel has not taken yet."""
 
     def send(self, data: bytes) -> bool:
-        """Send, or let wait; False if too much waits. Raises OSError if the connection is broken."""
+        """Send, and queue the rest; False if too much waits. Raises OSError if the connection is broken."""
         self.waiting += data
         if self.waiting:
             with suppress(BlockingIOError):

@@ -115,7 +115,7 @@ class Handler(RequestHandler):
         return next((value.decode("utf-8", "replace") for value in self.request.query_arguments.get(name, ())), None)
 
     def begin(self, kind: str, headers: Mapping[str, str]) -> Awaitable[None]:
-        """Send the headers of a response that has no end so far."""
+        """Send the headers of a response that stays open."""
         self._describe(Response(kind=kind, headers=headers))
         self._connection.stream.set_nodelay(True)
         return self.flush()

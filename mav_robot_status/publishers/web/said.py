@@ -40,7 +40,7 @@ def with_words(value: Any) -> Any:
 
 
 def _causes(line: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
-    """Errors, inhibits, and as `unheard` what says only that nothing is known."""
+    """Each cause with its list: errors, inhibits, or `unheard` if it says only that nothing is known."""
     return [
         ("unheard" if cause.get("name") == UNHEARD else group, cause)
         for group in ("errors", "inhibits")

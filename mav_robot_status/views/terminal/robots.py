@@ -154,7 +154,7 @@ class Memory:
 def _name(line: Mapping[str, Any], is_member: bool) -> str:
     """What people call it, else `1.1`, else its handle. A member of a group has the handle by which the group names it.
 
-    A handle that nobody has named is no help: its robot keeps its ids.
+    A default handle says nothing: its robot keeps its ids.
     """
     system, component, handle = line["system"], line["component"], str(line["handle"])
     if given := line["vehicle"].get("name"):
@@ -183,7 +183,7 @@ FILTERS: Final = (
 
 
 def counts(robots: Iterable[Robot]) -> tuple[int, dict[str, int]]:
-    """The number of robots, and of those that each filter takes. A group does not count beside its members."""
+    """The number of robots, and of those that each filter takes. A group is not counted in addition to its members."""
     single = [robot for robot in robots if not robot.line.get("members")]
     return len(single), {one.word: sum(map(one.takes, single)) for one in FILTERS}
 

@@ -54,7 +54,7 @@ def test_the_groups_of_a_configuration_stay() -> None:
         (["ur:a:rtde"], "this is not HOST or HOST:PORT"),
         (["ur:a:0"], "--arm ur:a:0: a port is a number from 1 to 65535, not 0"),
         (["ur:a:65536"], "--arm ur:a:65536: a port is a number from 1 to 65535, not 65536"),
-        (["ur:a", "ur:a"], "--arm ur:a is there twice: one arm has one handle"),
+        (["ur:a", "ur:a"], "--arm ur:a is given twice: one arm has one handle"),
     ],
 )
 def test_a_wrong_form_is_one_line_that_says_what_would_be_right(texts: list[str], message: str) -> None:

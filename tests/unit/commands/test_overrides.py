@@ -183,7 +183,7 @@ def test_a_name_of_the_command_line_replaces_that_of_the_file(tmp_path: Path) ->
 
 
 def test_one_vehicle_has_one_name() -> None:
-    with pytest.raises(UsageError, match=r"--name 1\.2= is there twice: one vehicle has one name"):
+    with pytest.raises(UsageError, match=r"--name 1\.2= is given twice: one vehicle has one name"):
         loaded(run("--name", "1.2=a", "--name", "1.2=b"))
 
 

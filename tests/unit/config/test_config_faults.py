@@ -38,7 +38,7 @@ FAULTS = [
     (
         "vehicles: [{system: 1, name: x}, {system: 1, name: y}]",
         "1:34",
-        "system 1 is there twice: one vehicle has one name",
+        "system 1 is given twice: one vehicle has one name",
     ),
     (
         "vehicles: [{system: 1, name: x}, {system: 2, handle: y}]",
@@ -57,7 +57,7 @@ FAULTS = [
         "'amr' is not a member: did you mean 'arm'?",
     ),
     ("groups: {robot: {handles: [robot]}}", "1:28", "'robot' is a group: a group has robots as members; name those"),
-    ("groups: {robot: {handles: [arm, arm]}}", "1:28", "'arm' is there twice: one member counts once"),
+    ("groups: {robot: {handles: [arm, arm]}}", "1:28", "'arm' is given twice: one member counts once"),
     (
         "hardware: [{type: ur, name: arm}]\ngroups: {arm: {}}",
         "2:10",
@@ -77,10 +77,14 @@ FAULTS = [
     ("a: b: c", "1:5", "mapping values are not allowed here: check the indentation, and quote"),
     ("links:\n  - a\n - b\n", "3:2", "while parsing a block mapping, expected <block end>, but found"),
     ("requests: 'none\n", "2:1", "while scanning a quoted scalar, found unexpected end of stream: close the quote"),
-    ("links: []\n---\nouts: []\n", "2:1", "expected a single document in the stream, but found another document: one "),
-    ("a: &x {type: b}\nc: *x\n", "2:4", "aliases (*name) are not taken here: write the value out"),
+    (
+        "links: []\n---\nouts: []\n",
+        "2:1",
+        "expected a single document in the stream, but found another document: write",
+    ),
+    ("a: &x {type: b}\nc: *x\n", "2:4", "aliases (*name) are not allowed here: write the value out"),
     ("links: [*]", "1:10", "while scanning an alias, expected alphabetic or numeric character, but found ']'"),
-    ("&a [*a]", "1:5", "aliases (*name) are not taken here"),
+    ("&a [*a]", "1:5", "aliases (*name) are not allowed here"),
     ("a: " + "[" * 1000, "1:23", "nested more than 20 deep"),
     ("links: [" + "a," * 20000 + "]", "1:40003", "more than 20000 values: this is not a configuration file"),
     ("a: !!python/object:os.system {}", "1:4", "the tag '!!python/object:os.system' means nothing here: remove it"),
@@ -93,7 +97,7 @@ FAULTS = [
     # top level
     ("- links", "1:1", "the configuration must be a mapping, not a list"),
     ("links", "1:1", "the configuration must be a mapping, not 'links'"),
-    ("requests: none\nrequests: missing", "2:1", "the key 'requests' is there twice, first at 1:1: remove one"),
+    ("requests: none\nrequests: missing", "2:1", "the key 'requests' is given twice, first at 1:1: remove one"),
     ("[a, b]: c", "1:1", "a key must be a word, not a list"),
     ("\n\nlink: []", "3:1", "'link' is neither a section nor a controller, which has a 'type': did you mean 'links'?"),
     (
@@ -158,7 +162,7 @@ FAULTS = [
     (
         "vehicles:\n- {system: 1, handle: a}\n- {system: 1, handle: b}",
         "3:3",
-        "system 1 is there twice: one vehicle has ",
+        "system 1 is given twice: one vehicle has ",
     ),
     ("identity: 5", "1:11", "identity must be a mapping with the keys system, component, heartbeat, not 5"),
     ("identity: {component: 0}", "1:23", "component must be a whole number from 1 to 255, not 0"),
@@ -228,7 +232,7 @@ FAULTS = [
     (
         "hardware: {mode_overrides: {rover: {4: AUTO, HOLD: MANUAL}}}",
         "1:46",
-        "mode 4 of rover is there twice, as 'HOLD' and with another name",
+        "mode 4 of rover is given twice, as 'HOLD' and with another name",
     ),
     ("hardware: {mode_overrides: {rover: {-1: AUTO}}}", "1:37", "the key must be a whole number from 0 to 4294967295"),
     (

@@ -59,13 +59,13 @@ def test_a_reason_comes_with_the_words_of_the_autopilot_and_the_next_step() -> N
 def test_a_loss_says_since_when_and_the_last_known_state() -> None:
     found = headline(line(**LOST), line(**LIVE, in_motion=True))
     assert found.word == "LOST"
-    assert spoken(found) == "Nothing is known since 14:03:10. It may be moving. Last known: AUTO, moving."
+    assert spoken(found) == "Unknown since 14:03:10. It may be moving. Last known: AUTO, moving."
     assert "not possible" not in spoken(found)
 
 
 def test_a_loss_without_an_age_began_when_the_last_line_was_heard() -> None:
     lost = line(**{**LOST, "link": {"state": "LOST", "heartbeat_age": None}})
-    assert spoken(headline(lost, line(**LIVE))).startswith("Nothing is known since 14:03:19.")
+    assert spoken(headline(lost, line(**LIVE))).startswith("Unknown since 14:03:19.")
     assert spoken(headline(lost)) == "Nothing is known. It may be moving."
 
 

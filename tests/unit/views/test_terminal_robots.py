@@ -136,7 +136,7 @@ def test_a_lost_robot_says_what_was_last_known_of_it_and_that_it_may_move() -> N
     (robot,) = memory.robots(Source(board).rows(), later(START, 5.0))
     told = " ".join(texts(details(robot, Signs())))
     assert robot.headline.word == "LOST"
-    assert "Nothing is known since " in told
+    assert "Unknown since " in told
     assert "It may be moving." in told
     assert "Last known: AUTO, moving." in told
     assert "Why this is unknown:   LINK_STALE since " in told  # it prevents no motion

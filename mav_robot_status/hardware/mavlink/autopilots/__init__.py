@@ -41,6 +41,6 @@ def announced_as(number: int) -> Autopilot:
 
 
 def shown_by(number: int, sensors_present: int) -> Autopilot | None:
-    """The software that its SYS_STATUS reveals behind another announced one; None: it is the announced one."""
+    """The software that SYS_STATUS reveals if the autopilot announces another; None: the announced one is right."""
     lacks, autopilot = _POSING.get(number, (0, None))
     return None if sensors_present & lacks else autopilot

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def numbers(key: str) -> Mapping[str, int]:
-    """custom_mode by name, of a key of `mode_overrides`; empty if its modes have no table.
+    """The custom_mode of each mode name, for a key of `mode_overrides`; empty if that key has no table of modes.
 
     The names are those of `vehicle.flight_mode`. Where a table gives two numbers one name, the lower number has it.
     """

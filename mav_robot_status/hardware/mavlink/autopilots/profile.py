@@ -97,15 +97,15 @@ class Texts(NamedTuple):
     rules: tuple[TextRule, ...]
     stop_text: StopText
     checks: re.Pattern[str] | None
-    """The texts of a burst that names every failing pre-arm check; group 1 is the reason without a prefix. None: its
-    texts say why it cannot be armed one by one, and the latest counts."""
+    """The texts of a burst that names every failing pre-arm check; group 1 is the reason without a prefix. None: each
+    text gives one reason why it cannot be armed, and the latest one counts."""
     safety_switch: frozenset[str]
     """The texts that give the safety switch as the reason not to arm."""
     sends_events: bool
     """Whether the levels of an EVENT have the meaning of STATUSTEXT severities."""
     failsafe_is_any: Mapping[Family, re.Pattern[str]]
-    """By family, the texts about a failsafe that name radio or ground station whichever of both is lost; the text that
-    clears one clears both."""
+    """By family, the texts about a failsafe that name the radio or the ground station regardless of which is lost; the
+    text that clears one clears both."""
     firmware: Mapping[str, Family]
     """The names of the firmware in the text of its boot, which gives its version, each with its kind of vehicle."""
 
@@ -132,7 +132,7 @@ class Sensors(NamedTuple):
 
 
 class StopCheck(NamedTuple):
-    """The pre-arm check that fails while a stop is engaged. Firmware before these versions lacks what they name."""
+    """The pre-arm check that fails while a stop is engaged. Each version is the first that has what its field names."""
 
     first: Mapping[Family, Version]
     """The check itself. A family without a row never has it."""
@@ -149,7 +149,7 @@ class Stops(NamedTuple):
     shown_from: Version | None
     """The first version whose state shows every stop; older ones only send texts. None: all versions do, or none."""
     honoured_by: frozenset[Family] | None
-    """The families whose motors a stop by switch or MAV_CMD_DO_AUX_FUNCTION stops. None: no such stop is known."""
+    """The families whose motors are stopped by a switch or by MAV_CMD_DO_AUX_FUNCTION. None: no such stop is known."""
     check: StopCheck | None
     """The pre-arm check of stops. None: there is none."""
     outputs_show: bool

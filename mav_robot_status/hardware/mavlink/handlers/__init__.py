@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["HANDLERS", "hear", "overheard", "pass_time", "transmitter_heard"]
 
 Handler = Callable[[VehicleState, Any, Instant, "HardwareOptions"], "bool | None"]
-"""It returns True if it has changed nothing that a fact is made of, but for later times and new values of the same
-meaning. Then no fact has changed, unless `LatestMessages.unsettled` is set. Anything else: a fact may have changed."""
+"""It returns True if no fact has changed, unless `LatestMessages.unsettled` is set: of what facts are made of, it has
+changed only times, to later ones, and values, to others of the same meaning. Anything else: a fact may have changed."""
 
 HANDLERS: Final[dict[type, Handler]] = {
     mav.Heartbeat: heartbeat.heartbeat,

@@ -49,7 +49,7 @@ def response_event_error(
 
 
 def _is_ahead(state: VehicleState, message: Event, now: Instant) -> bool:
-    """Whether the clock of the autopilot has not reached the time of an event, which is then of the run before."""
+    """Whether the time of an event is ahead of the autopilot's clock: then the event is from the run before."""
     boot = state.boot
     return boot.clock_ms is not None and message.event_time_boot_ms > (now.mono - boot.at) * 1000 + BACK_MS
 
@@ -66,7 +66,7 @@ def _announce(state: VehicleState, message: Event, arrival: Arrival, now: Instan
     code, text = failsafe_cause(message), None if state.event_table is None else state.event_table.message(message)
     is_critical = state.heartbeats.state == MAV_STATE_CRITICAL
     if code is not None:
-        # a failsafe of the past is over when its state is
+        # a past failsafe has ended if its state CRITICAL has ended
         if is_critical or (state.heartbeats.armed and arrival is Arrival.NEWEST):
             before = state.latches.get(code)
             text = text or (before and before.text)

@@ -21,7 +21,7 @@ TIMEOUT: Final = 1.5
 
 
 def _names_either(state: VehicleState, text: str | None) -> bool:
-    """Whether a text names radio or ground station whichever of both is lost."""
+    """Whether a text names the radio or the ground station regardless of which is lost."""
     pattern = state.profile.texts.failsafe_is_any.get(state.family)
     return pattern is not None and text is not None and pattern.match(text) is not None
 

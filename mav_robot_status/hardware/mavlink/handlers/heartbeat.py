@@ -35,7 +35,7 @@ LONGEST_START: Final = 10.0
 TICKS: Final = 1.5
 """Seconds within which a clock counts as running."""
 BACK: Final = 10.0
-"""Seconds after the return of the link within which the clock shows whose it is."""
+"""Seconds after the link returns within which the clock shows whether this is the same vehicle."""
 
 
 def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: HardwareOptions) -> None:
@@ -83,7 +83,7 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
     if heartbeats.armed and not before.armed:
         _armed(state, last, now)
     if state.profile.stops.shown_by is EmergencyStop.STATE and message.system_status == MAV_STATE_FLIGHT_TERMINATION:
-        state.stop = estop.NOTHING  # it shows its stops, and need not be believed on its word
+        state.stop = estop.NOTHING  # its state shows its stops, so what it said is not needed
     look_again(state, now.mono)
     if heartbeats.calm_since == now.mono:
         state.failsafe = None
@@ -116,9 +116,9 @@ def _starts_anew(previous: Heartbeat, message: Heartbeat, state: VehicleState) -
 
 
 def _is_another_run(state: VehicleState, started: float) -> bool:
-    """Whether a text that only a starting autopilot sends comes from another run than the one known.
+    """Whether a text that only a starting autopilot sends comes from another run than the known one.
 
-    A clock that still arrives decides itself. Without one, a run that is known for longer than a start takes has ended.
+    If a clock still arrives, the clock decides. Otherwise a run that was known for longer than a start takes has ended.
     """
     seen = state.latest
     clocks = (seen.attitude, seen.global_position, seen.local_position)
@@ -127,7 +127,7 @@ def _is_another_run(state: VehicleState, started: float) -> bool:
 
 
 def clock_changed(state: VehicleState, now: Instant) -> None:
-    """The clock gives another boot time: a correction, which only matters for faults, a reboot, or two clocks."""
+    """The clock gives another boot time: a reboot, two clocks, or a correction, which matters only for faults."""
     boot = state.boot
     if boot.in_turn:
         state.claims.contradict("time_boot_ms of two clocks in turn", state.claims.way, now)

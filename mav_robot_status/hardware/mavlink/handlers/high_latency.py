@@ -31,7 +31,7 @@ def follows(state: VehicleState, message: HighLatency2) -> bool:
 
 
 def high_latency(state: VehicleState, message: HighLatency2, now: Instant, options: HardwareOptions) -> None:
-    """A HIGH_LATENCY2 of a vehicle that sends no HEARTBEAT. What HEARTBEATs told stays, for when they come again."""
+    """A HIGH_LATENCY2 of a vehicle that sends no HEARTBEAT. What HEARTBEATs said is kept until they come again."""
     if (message.autopilot, message.type) != (state.autopilot, state.vehicle_type):
         boots = state.boots
         state.become(begin(rules.stated(message), now, state.claims))

@@ -212,5 +212,5 @@ def _moved(
 
 
 def _speed_counts_alike(state: VehicleState) -> bool:
-    """Whether no rule compares the latest speed: one does, while a vehicle moves that is disarmed."""
+    """Whether no rule compares the latest speed. One does while a disarmed vehicle moves."""
     return state.heartbeats.armed or state.motion.value is not motion.TRUE

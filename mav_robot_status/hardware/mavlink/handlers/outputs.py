@@ -25,7 +25,7 @@ STOP_POSITION: Final = 1800
 
 NO_PULSE: Final = 0xFFFF
 COASTING: Final = 3.0
-"""Seconds after the report of a stop in which a vehicle may still move, and its motors turn."""
+"""Seconds after the report of a stop for which a vehicle may still move, and its motors may still turn."""
 
 _NUMBERED: Final = re.compile(rb"SERVO(\d{1,2})_FUNCTION|RC(\d{1,2})_OPTION")
 
@@ -118,7 +118,7 @@ def look_again(state: VehicleState, now: float) -> None:
     if stop.said is TriState.TRUE and state.heartbeats.armed and _has_power(state, now):
         stop = estop.doubted(stop, estop.UNDER_POWER, now)
     if shown_from is not None and state.version is not None and state.version >= shown_from:
-        stop = estop.NOTHING  # it shows its stops, and need not be believed on its word
+        stop = estop.NOTHING  # its state shows its stops, so what it said is not needed
     state.stop = stop
 
 

@@ -56,7 +56,7 @@ TRANSMITTERS: Final[dict[int, str]] = {
     mavlink.MAV_COMP_ID_ODID_TXRX_2: "remote ID 2",
     mavlink.MAV_COMP_ID_ODID_TXRX_3: "remote ID 3",
 }
-"""The Remote ID transmitters by component id. What the autopilot says of one is what the first one told it."""
+"""The Remote ID transmitters by component id. A status that the autopilot passes on counts as one from the first."""
 
 
 def battery_status(state: VehicleState, message: BatteryStatus, now: Instant, options: HardwareOptions) -> bool:

@@ -1,4 +1,4 @@
-"""Makes an `EventTable` of the bytes of a file: JSON, or JSON in xz, as PX4 publishes them (`all_events.json.xz`).
+"""Makes an `EventTable` from the bytes of a file: JSON, or JSON in xz, as PX4 publishes them (`all_events.json.xz`).
 
 The file may come from anybody: everything is bounded and checked before it is used. TableError is the only exception.
 Source of the format: mavlink/libevents, validation/schema.json.
@@ -105,7 +105,7 @@ def _integer(digits: str) -> int:
 
 
 def _no_constant(name: str) -> object:
-    raise TableError(f"the table is not JSON: {name} is not a number of it")
+    raise TableError(f"the table is not JSON: {name} is not a JSON number")
 
 
 def _mapping(value: object, what: str) -> Mapping[str, Any]:

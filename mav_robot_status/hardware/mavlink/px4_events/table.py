@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ....mavlink.definitions import Event
 
 ARGUMENT_BYTES: Final = 40
-"""The arguments of an EVENT. What a definition has beyond them does not arrive."""
+"""The bytes of an EVENT's arguments. Arguments of a definition that lie beyond them do not arrive."""
 CODES: Final = {
     "uint8_t": "B",
     "int8_t": "b",
@@ -103,7 +103,7 @@ class EventTable:
         return None if found is None else filled(found.message, found.values(event.arguments)) or None
 
     def description(self, event: Event) -> str | None:
-        """What a person can do about it; None if the table does not tell."""
+        """What a person can do about it; None if the table does not say it."""
         found = self.events.get(event.id)
         if found is None:
             return None
@@ -120,7 +120,7 @@ def component_words(table: EventTable | None, index: int) -> str:
 
 
 def summary_numbers(table: EventTable | None, event: Event) -> tuple[int, ...]:
-    """The arguments of a summary. The table knows the widths of another version; without it they are those of 1.14."""
+    """The arguments of a summary. A table gives the widths of its version; without one they are those of 1.14."""
     found = None if table is None else table.events.get(event.id)
     numbers = SUMMARY.unpack_from(event.arguments.ljust(ARGUMENT_BYTES, b"\0"))
     if found is not None and len(given := found.numbers(event.arguments)) >= 4:

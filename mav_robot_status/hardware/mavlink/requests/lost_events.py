@@ -19,7 +19,7 @@ class LostEvents:
         """The sequence numbers that were asked for and are still missing."""
 
     def due(self, missing: tuple[int, ...]) -> RequestEvent | None:
-        """The next request, for the first numbers without a gap that were not asked for; None if there are none.
+        """The next request, for the first run of consecutive numbers that were not asked for; None if there is none.
 
         `missing` are the sequence numbers that have not arrived, the oldest first.
         """

@@ -45,7 +45,7 @@ PROGRESS: Final = 5.0  # s more after IN_PROGRESS, or until a retry after TEMPOR
 RETRIES: Final = 3
 ANSWER: Final = 0.3  # s from the acknowledgement of a question to its answer
 SILENT: Final = 3
-"""Windows of LOOK seconds without a message that arrived before: it has fallen silent."""
+"""After this many windows of LOOK seconds without it, a message that arrived before has fallen silent."""
 LONGEST_BOOT: Final = 60.0  # s
 NO_STREAMS: Final = frozenset(
     {
@@ -79,7 +79,7 @@ class _Command:
         self.older = older
         """The command to send if this one is not supported."""
         self.again = again
-        """Whether it ends with the message that it asks for, and with no acknowledgement but a second refusal."""
+        """Whether only the message that it asks for, or a second refusal, ends it. Other acknowledgements do not."""
         self.tries = 0
         self.due = -math.inf
 
@@ -176,7 +176,7 @@ class Requests:
             self._queue = deque(c for c in self._queue if not _is_met(c, message_id, rate))
 
     def delivered(self, message_id: int) -> None:
-        """A message has arrived that is requested until it does."""
+        """A message that is requested until it arrives has arrived."""
         self._queue = deque(c for c in self._queue if not (c.again and c.params[0] == message_id))
 
     def outstanding(self) -> list[str]:
@@ -251,7 +251,7 @@ class Requests:
         return min(self._look_at, self._queue[0].due if self._queue else math.inf)
 
     def _look(self, now: float, wanted: tuple[Wanted, ...], once: tuple[Once, ...]) -> None:
-        """The end of a window: ask in its turn, or because a message has fallen silent, for what is missing."""
+        """The end of a window: ask for what is missing, if a round is due or a message has fallen silent."""
         self._note_rates(now)
         if self._fell_silent(wanted):
             counts = dict(self._counts)
@@ -311,6 +311,6 @@ class Requests:
 
 
 def _is_met(command: _Command, message_id: int, rate: float) -> bool:
-    """Whether a request that was not sent yet is unnecessary, because its message comes at least at half its rate."""
+    """Whether a request that was not sent yet is unnecessary, because its message arrives at half its rate or more."""
     wanted = command.command == MAV_CMD_SET_MESSAGE_INTERVAL and command.params[0] == message_id
     return wanted and command.tries == 0 and rate >= 1e6 / command.params[1] / 2

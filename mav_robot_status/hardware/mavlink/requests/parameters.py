@@ -13,7 +13,7 @@ from ....mavlink import definitions as mav
 
 # the first four RC channels are the sticks
 NAMES: Final = (*(f"SERVO{n}_FUNCTION" for n in range(1, 17)), *(f"RC{n}_OPTION" for n in range(5, 17)))
-FIRST: Final = 5.0  # s after the first heartbeat: messages are requested before
+FIRST: Final = 5.0  # s after the first heartbeat: messages are requested first
 APART: Final = 0.4  # s between two requests, so that the answers stay below 100 bytes a second
 PATIENCE: Final = 5.0  # s after the last request until the second round
 ROUNDS: Final = 2

@@ -21,7 +21,7 @@ LISTEN: Final = 3.0
 
 
 def is_wanted(tracked: TrackedVehicle, now: float) -> bool:
-    """Whether the vehicle is disarmed beyond doubt, can be asked, and has not told why its checks fail, or whether."""
+    """Whether the vehicle is disarmed beyond doubt, can be asked, and has not said whether, or why, its checks fail."""
     state, facts = tracked.state, tracked.facts
     if state is None or not facts or not state.profile.requests.prearm_checks:
         return False

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from ..vehicle import TrackedVehicle
 
-ROOM: Final = 0.5  # s until a vehicle is looked at again whose link has no room
+ROOM: Final = 0.5  # s until a vehicle whose link has no room is looked at again
 ANSWERS: Final = frozenset(
     d.id for d in mav.MESSAGES.values() if d.type in (CommandAck, MessageInterval, ParamValue, Statustext)
 )

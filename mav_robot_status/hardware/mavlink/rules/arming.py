@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 def can_arm(facts: Facts) -> TriState:
     """What the report says; UNKNOWN while SYS_STATUS contradicts it.
 
-    PX4 reports at most every 2 s, and SYS_STATUS may be newer. Of an armed vehicle SYS_STATUS shows something else:
-    whether the mode can go on.
+    PX4 reports at most every 2 s, and SYS_STATUS may be newer. For an armed vehicle SYS_STATUS shows something else:
+    whether the mode can continue.
     """
     reported, shown = facts.arming.can_arm, facts.sys_status.ready
     if facts.armed or not facts.fresh.sys_status or UNKNOWN in (reported, shown):

@@ -1,6 +1,6 @@
 """What is left of a status while another sender claims the ids of the vehicle: only what all senders agree on.
 
-Nobody can tell which of them is the vehicle. A heartbeat tells armed and mode; all else is of one sender alone.
+Nobody can tell which of them is the vehicle. A heartbeat shows armed and mode; all else comes from one sender only.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def _by_state(facts: Facts, options: HardwareOptions) -> Finding:
         return FALSE, SAID
     if _is_assumed_free(facts, options):
         return FALSE, ASSUMED
-    return UNKNOWN, Reason("PX4 before 1.12 shows a kill in words alone", Source.VERSION)
+    return UNKNOWN, Reason("PX4 before 1.12 shows a kill only in texts", Source.VERSION)
 
 
 def _deduced(facts: Facts, options: HardwareOptions) -> Finding:
@@ -99,10 +99,10 @@ def _doubt(rule: str) -> Reason:
 
 
 def _released(facts: Facts, options: HardwareOptions, watched: TriState, why: Reason) -> Finding:
-    """FALSE if there is evidence that no stop is engaged. `watched` with its reason is that of the outputs."""
+    """FALSE if there is evidence that no stop is engaged. `watched` and its reason `why` are what the outputs show."""
     if not facts.armed and facts.fresh.sys_status and facts.stop.is_ready:
         if facts.stop_excused:
-            excused = "the pre-arm checks pass, but excuse a stop by the switch of option 165"
+            excused = "the pre-arm checks pass, but do not fail on a stop by the switch of option 165"
             return UNKNOWN, Reason(excused, Source.SWITCHES)
         return FALSE, Reason("the pre-arm checks, which include the stop, pass", Source.PREARM_CHECK)
     if facts.stop.said is FALSE:

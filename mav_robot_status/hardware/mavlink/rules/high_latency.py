@@ -1,4 +1,4 @@
-"""The fields of a vehicle that is heard by HIGH_LATENCY2 alone.
+"""The fields of a vehicle that is heard only through HIGH_LATENCY2.
 
 It says nothing of MAV_STATE, of an emergency stop or of the outputs. It says armed or disarmed on ArduPilot only. It
 proves motion, but never rest: its samples are a minute apart, and the vehicle may have started since the last.
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from ..options import HardwareOptions
 
 SOURCE: Final = Source.HIGH_LATENCY
-ARMED_UNTOLD: Final = Reason("this HIGH_LATENCY2 does not tell whether it is armed", SOURCE)
-STATE_UNTOLD: Final = Reason("armed, but HIGH_LATENCY2 does not tell MAV_STATE", SOURCE)
+ARMED_UNTOLD: Final = Reason("this HIGH_LATENCY2 does not say whether the vehicle is armed", SOURCE)
+STATE_UNTOLD: Final = Reason("armed, but HIGH_LATENCY2 does not report MAV_STATE", SOURCE)
 MOVES: Final = Reason("two messages show motion", SOURCE)
 NOT_MOVING: Final = Reason("nothing shows motion, and samples so far apart cannot show rest", SOURCE)
 
@@ -33,7 +33,7 @@ def e_stopped(options: HardwareOptions) -> Finding:
 
 
 def drives_powered(told: Seldom, facts: Facts, options: HardwareOptions) -> Finding:
-    """Armed, if it is told."""
+    """Armed, if the message says whether it is armed."""
     if told.armed is UNKNOWN:
         return UNKNOWN, ARMED_UNTOLD
     if told.armed is FALSE:
@@ -61,7 +61,7 @@ def in_motion(told: Seldom) -> Finding:
 
 
 def inhibits(told: Seldom, facts: Facts, options: HardwareOptions, mode: FlightMode) -> list[str]:
-    """The reasons that are told. What is not told is not a reason."""
+    """The reasons that the message shows. What it does not show is not a reason."""
     reasons = {
         "DISARMED": told.armed is FALSE,
         "INITIALISING": told.armed is not UNKNOWN and is_initialising(facts),

@@ -20,9 +20,9 @@ def in_motion(facts: Facts, options: HardwareOptions) -> Finding:
     on_ground = aircraft and landed == MAV_LANDED_STATE_ON_GROUND
     if facts.armed and aircraft and landed in IN_THE_AIR and options.hover_is_motion:
         if facts.lies and _is_still(facts):
-            return FALSE, Reason("airborne by its word, but at rest since it had no thrust", Source.LANDED_NUMBER)
+            return FALSE, Reason("it reports airborne, but is at rest since it had no thrust", Source.LANDED_NUMBER)
         if facts.has_no_lift and _is_still(facts):
-            return UNKNOWN, Reason("airborne, but still and without the throttle to fly", Source.LANDED_NUMBER)
+            return UNKNOWN, Reason("airborne, but not moving, and without the throttle to fly", Source.LANDED_NUMBER)
         return TRUE, Reason("airborne", Source.LANDED_NUMBER)
     value, why = _measured(facts, on_ground)
     if why.source is Source.NONE:
@@ -31,7 +31,7 @@ def in_motion(facts: Facts, options: HardwareOptions) -> Finding:
         value = FALSE
     if value is FALSE and facts.armed and aircraft and landed == MAV_LANDED_STATE_UNDEFINED and not _is_landed(facts):
         source = Source.VELOCITY if why.source is Source.VELOCITY else Source.NONE
-        return UNKNOWN, Reason("armed, and nothing tells whether it is airborne", source)
+        return UNKNOWN, Reason("armed, and nothing shows whether it is airborne", source)
     return value, why
 
 

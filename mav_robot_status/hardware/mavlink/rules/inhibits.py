@@ -75,7 +75,7 @@ def _of_stop(facts: Facts, stopped: Finding) -> Iterator[Named]:
 
 
 def _of_checks(facts: Facts, before: Detail, now: Instant) -> Iterator[Inhibit]:
-    """One inhibit for each reason why it cannot be armed; one of our own words, or none, if no reason is told."""
+    """One inhibit for each reported reason why it cannot be armed; if there is none, one with our own text or none."""
     if facts.armed:
         return
     fails = _is_not_ready(facts)
@@ -94,7 +94,7 @@ def _refused_by_parts(facts: Facts) -> tuple[NotReady, ...]:
 
 
 def _unhealthy(facts: Facts) -> str | None:
-    """What a PX4 shows that has not reported why: the unhealthy bits of SYS_STATUS, else the state that says so."""
+    """What a PX4 shows while it has not reported why: unhealthy bits of SYS_STATUS, else a state of not ready."""
     mask = facts.sys_status.unhealthy if facts.fresh.sys_status else 0
     names = [sensor_name(bit) for bit in range(mask.bit_length()) if mask >> bit & 1]
     if names:

@@ -1,4 +1,4 @@
-"""Settles the facts of a vehicle, from its state, the options and a `Moment`. Each has its function."""
+"""Settles the facts of a vehicle, from its state, the options and a `Moment`. Each fact has its own function."""
 
 from .causes import faults
 from .table import SETTLE, Settle, claimed, facts_of, fresh

@@ -57,7 +57,7 @@ def receiver_stands(state: VehicleState, moment: Moment, options: HardwareOption
 
 
 def turns(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
-    """Whether it turns. The estimator's own word against it makes that unknown."""
+    """Whether it turns. This is unknown while the estimator itself says that it is wrong."""
     return (
         settled(state.rotation, moment) is TRUE
         and moment.is_fresh(state.latest.attitude, FRESH)

@@ -1,7 +1,8 @@
 """RS_STOP: the applet on an ArduPilot says whether its emergency stop or its safety switch holds the motors.
 
 It is a NAMED_VALUE_FLOAT of the autopilot: 1 for the emergency stop plus 2 for the safety switch, sent at each change
-and once a second. The autopilot knows it, so it stands above texts, pre-arm checks and outputs.
+and once a second. The autopilot knows its stop, so RS_STOP counts more than texts, pre-arm checks and
+outputs.
 """
 
 from __future__ import annotations
@@ -60,5 +61,5 @@ def is_fresh(applet: Applet, now: float) -> bool:
 
 
 def stops(applet: Applet, honours: bool) -> bool:
-    """Whether the word means a stop of a vehicle that `honours` the emergency stop, or does not."""
+    """Whether the word means a stop. `honours`: whether the emergency stop stops the motors of this vehicle."""
     return bool(applet.value & (EMERGENCY_STOP | SAFETY_SWITCH if honours else SAFETY_SWITCH))

@@ -32,7 +32,7 @@ def can_arm(mask: int, group: int | None) -> TriState:
 def blocked_modes(mask: int, table: EventTable | None, modes: Mapping[int, AvailableMode]) -> tuple[str, ...] | None:
     """The names of the flight modes that cannot be armed; None without a table.
 
-    A mode without a name is a place for one that an application may register: the vehicle does not have it.
+    A mode without a name is free for an application to register: the vehicle does not have it.
     """
     if table is None or not table.mode_groups:
         return None
@@ -44,8 +44,8 @@ def blocked_modes(mask: int, table: EventTable | None, modes: Mapping[int, Avail
 def failing(report: ArmingReport, mask: int, group: int | None) -> list[Check]:
     """The failing checks of a mode group, the most restrictive first; all checks if the group is not known.
 
-    A check that concerns a mode which can be armed need not block any: PX4 gives a warning the mask of all modes. If it
-    is less than a warning, it blocks none.
+    A check that concerns a mode that can be armed may block no mode: PX4 gives warnings the mask of all modes. Below
+    the level of a warning, such a check blocks none.
     """
     if group is not None and mask >> group & 1:
         return []

@@ -1,8 +1,8 @@
 """PX4's report of its arming checks: which mode groups may be armed, and the checks that fail.
 
 A report is a summary, one event for each failing check, and a second summary that closes it. It counts when all of it
-has arrived, in whatever order. It says nothing any more while an event after it is missing, because that may begin a
-newer one. Chunks combine as in libevents (`health_and_arming_checks.cpp`): AND for what can be armed, all checks.
+has arrived, in whatever order. It no longer counts while an event after it is missing, because that event may begin a
+newer report. Chunks combine as in libevents (`health_and_arming_checks.cpp`): AND for what can be armed, all checks.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Check(NamedTuple):
     component: int
     """The index of the health component."""
     since: Instant
-    """Since when each report has it."""
+    """Since when every report contains it."""
 
     @property
     def level(self) -> int:
@@ -109,7 +109,7 @@ def is_complete(report: ArmingReport, known: EventSequence) -> bool:
 def _with_report_to(
     report: ArmingReport, known: EventSequence, last: int, table: EventTable | None, now: Instant
 ) -> ArmingReport:
-    """The report with that to the closing summary `last`, if it is whole and newer."""
+    """`report` after the events that end with the closing summary `last`, if these are all there and newer."""
     found = _events_to(known, last)
     if found is None:
         return report

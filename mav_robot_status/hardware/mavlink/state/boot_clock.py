@@ -16,9 +16,9 @@ STEP_BACK: Final = STEP_BACK_MS / 1000  # seconds
 WRAP: Final = 1 << 32  # of a clock of 32 bits, after 49 days
 HALF: Final = WRAP // 2
 APART: Final = 10.0
-"""A link delays and repeats packets by fewer seconds. Clocks that differ by more are two."""
+"""Seconds. A link delays and repeats packets by less, so times that differ by more come from two clocks."""
 REFUTED: Final = 3
-"""Steps back that were not confirmed, each within APART seconds of the last, which repeated packets do not explain."""
+"""This many unconfirmed steps back, each within APART seconds of the last, are too many for repeated packets."""
 DRIFT: Final = 0.05
 """The error of a clock, as a part of its time, at most STEP_BACK: a simulation may run slower than its clock."""
 GRACE: Final = 10.0

@@ -2,11 +2,11 @@
 
 A *way* is a channel on which frames arrive; here it is any hashable value. One way is selected for each vehicle, and
 only its frames change the state. The heartbeats of every other sender of the same ids are *claims*. They change no
-state, but they are held against the selected way:
+state, but they are compared with the selected way:
 
 - A live claim that is armed makes a disarmed selected way doubtful at once.
-- Claims that differ for longer than a slow way explains, or in what no vehicle changes, are a conflict.
-- A silent way gives way to one that does not contradict it; to one that does only when the vehicle is lost.
+- Claims are a conflict if they differ for longer than a slow way explains, or in what no vehicle changes.
+- A silent way is replaced by one that does not contradict it. One that does has to wait for a link loss.
 - A HIGH_LATENCY2 is a statement as a HEARTBEAT is (`high_latency.stated`). It comes seldom, so it counts for longer; it
   never takes the place of a HEARTBEAT that arrives, and gives way to one at once.
 
@@ -50,7 +50,7 @@ CONTINUES: Final = 48
 COUNTED_APART: Final = 42
 """MISSION_CURRENT: Betaflight counts its sequence numbers apart from those of all other messages (recorded)."""
 SIGNED_LASTS: Final = 30.0
-"""Seconds after a verified frame in which frames without a verified signature are not claims."""
+"""Seconds after a verified frame for which frames without a verified signature are not claims."""
 MOST_CLAIMS: Final = 8
 MOST_COPIES: Final = 16
 
@@ -108,9 +108,9 @@ class Claim:
     ) -> None:
         self.way, self.heartbeat, self.at = way, heartbeat, at
         self.armed_at = (at if counts_from is None else counts_from) if is_armed(heartbeat) else NEVER
-        """When this count of sequence numbers said armed. NEVER if it said disarmed since."""
+        """When the sender with this count of sequence numbers said armed. NEVER if it has said disarmed since."""
         self.former_at = NEVER
-        """When another count last said armed. Nothing but time ends that."""
+        """When a sender with another count last said armed. Only time ends that."""
         self.copied = False
         """Whether a router copied it from another way: then it is not a claim of its own."""
         self.booted: float | None = None
@@ -141,7 +141,7 @@ class Claim:
     def hear(
         self, heartbeat: Heartbeat, sequence: int, at: float, counts_from: float | None = None, *, signed: bool = False
     ) -> bool:
-        """Note a heartbeat. Returns whether it continues the count: then the sender of the one before sent it.
+        """Note a heartbeat. Returns whether it continues the count: then it has the same sender as the one before.
 
         It counts for LIVE seconds from `counts_from` on; None: from `at` on.
         """
@@ -204,7 +204,7 @@ class Claims(Generic[C]):
         self.news: Conflict | None = None
         """A conflict that has begun. The owner logs and resets it."""
         self.armed_at = self.disarmed_at = self.differed_at = NEVER
-        """When any sender but the selected one said armed; disarmed; and when two did not say the same."""
+        """When a sender other than the selected one last said armed; said disarmed; when two last differed."""
         self.verified_at = NEVER
         """When the latest frame with a verified signature arrived."""
         self.lasts = LEAST_TIMEOUT
@@ -378,7 +378,7 @@ class Claims(Generic[C]):
             claim.follow(sequence)
 
     def clock(self, way: C, other: float, booted: float | None, now: Instant) -> None:
-        """Note that the autopilot on a way that is not selected booted at `other`; the one on the selected, `booted`.
+        """Note that the autopilot on another way booted at `other`, and the one on the selected way at `booted`.
 
         After a reboot one way shows the new time before the other. So one sample proves nothing.
         """
@@ -438,14 +438,14 @@ class Claims(Generic[C]):
         return at + self.lasts - LIVE if is_statement(heartbeat) else at
 
     def _note(self, heartbeat: Heartbeat, at: float) -> None:
-        """Note what is said beside the selected way, or no longer on it: for what all agree on during a conflict."""
+        """Note what another way says, or the selected one no longer says: it shows what all agree on in a conflict."""
         if is_armed(heartbeat) or not tells_armed(heartbeat):
             self.armed_at = max(self.armed_at, at)  # a way that is selected again may have said it long ago
         if not is_armed(heartbeat):
             self.disarmed_at = max(self.disarmed_at, at)
 
     def _compare(self, speaker: Hashable | None, now: Instant) -> None:
-        """Hold the live claims against the selected way, after a heartbeat of `speaker` (None: the selected way)."""
+        """Compare the live claims with the selected way, after a heartbeat of `speaker` (None: the selected way)."""
         at, mine = now.mono, self.mine
         for key in [key for key, claim in self.others.items() if at - max(claim.at, claim.doubt_at) > HOLD]:
             del self.others[key]
@@ -474,12 +474,12 @@ def _kind(heartbeat: Heartbeat) -> tuple[int, int]:
 
 
 def _stance(heartbeat: Heartbeat) -> tuple[int, ...]:
-    """What one vehicle says alike on all its ways."""
+    """What one vehicle says in the same way on all its ways."""
     return heartbeat.autopilot, heartbeat.type, heartbeat.base_mode, heartbeat.custom_mode
 
 
 def _disarms(heartbeat: Heartbeat, before: Heartbeat) -> bool:
-    """Whether a heartbeat takes back that a vehicle is armed, or that it may be."""
+    """Whether a heartbeat ends the claim that a vehicle is armed, or that it may be."""
     if tells_armed(before):
         return is_armed(before) and not is_armed(heartbeat)
     return tells_armed(heartbeat) and not is_armed(heartbeat)

@@ -1,4 +1,4 @@
-"""What the estimator says about itself. A disarmed vehicle at rest was seen with 14 m/s while it said that it is wrong.
+"""What the estimator says about itself. Recorded: 14 m/s for a disarmed vehicle at rest, while it said it was wrong.
 
 Sources: recorded; ArduPilot, `AP_Arming` (a failed check is repeated every 30 s) and `AP_AHRS::send_ekf_status_report`.
 """
@@ -19,8 +19,8 @@ FRESH: Final = 10.0
 
 
 def denied_until(state: VehicleState) -> float:
-    """Until when (monotonic seconds) the estimate of a disarmed vehicle is wrong by its estimator's own word: in
-    SYS_STATUS, in a text of the pre-arm checks, or in EKF_STATUS_REPORT. -inf: it is not; inf: until another message.
+    """Until when (monotonic seconds) a disarmed vehicle itself says that its estimate is wrong: in SYS_STATUS, in a
+    text of the pre-arm checks, or in EKF_STATUS_REPORT. -inf: it does not; inf: until another message.
     """
     if not state.profile.speeds.needs_healthy_estimator or state.heartbeats.armed:
         return -math.inf

@@ -6,11 +6,11 @@ Evidence of a stop has a kind. What is measured counts more than what is shown, 
   said ends with the opposite, with a link loss, with passing pre-arm checks that include the stop, with the next arming
   and with a sign of power: a driven motor, or rpm or motion under throttle while the outputs do not show the stop.
 * shown: the state in the HEARTBEAT, the safety switch and PREARM_CHECK in SYS_STATUS, RS_STOP of the applet. It ends
-  when it is too old, and when the other word arrives.
+  when it is too old, and when the opposite arrives.
 * measured: the motor outputs (`outputs`).
 
-Evidence of a stop that ends in another way than by evidence of a release leaves a doubt: the stop may last, so nothing
-says that the drives have power. A doubt ends with a release, a driven motor, passing checks, the applet or an arming.
+If evidence of a stop ends without evidence of a release, a doubt remains: the stop may last, so nothing proves that
+the drives have power. A doubt ends with a release, a driven motor, passing checks, the applet or an arming.
 
 On ArduPilot an e-stop by RC switch or command changes neither HEARTBEAT nor, while armed, SYS_STATUS. Without other
 evidence an armed vehicle is UNKNOWN. PX4 shows every stop as state FLIGHT_TERMINATION; versions before 1.12 only send
@@ -61,19 +61,19 @@ class Stop(NamedTuple):
     repeats: bool = False
     """Whether ArduPilot repeats the text while the stop lasts."""
     ready: int = 0
-    """Healthy SYS_STATUS in a row while disarmed."""
+    """The number of healthy SYS_STATUS in a row while disarmed."""
     ready_at: float = 0.0
     doubt: str | None = None
     """Why a stop may last: there was evidence of it, and none of its end. None: no such evidence."""
 
 
-LINK_LOST: Final = "a stop was reported, and the link was lost since"
+LINK_LOST: Final = "a stop was reported, and the link has been lost since"
 UNDER_POWER: Final = "a stop was reported, and since then there are signs of power"
 UNANSWERED: Final = "a command to stop or to release has no clear acknowledgement"
 HELD: Final = "the motor outputs were held by a stop, and no release was seen"
 SHUT_DOWN: Final = "the motors were switched off while armed, and have not been driven since"
-ARMED: Final = "a stop was reported before the arming, which this firmware may not refuse"
-APPLET_SILENT: Final = "the applet reported a stop, and is silent since"
+ARMED: Final = "a stop was reported before the arming, and this firmware may arm while it is stopped"
+APPLET_SILENT: Final = "the applet reported a stop, and has been silent since"
 """The doubts."""
 NOTHING: Final = Stop()
 
@@ -106,7 +106,7 @@ def ended(stop: Stop) -> Stop:
 
 
 def unsure(stop: Stop, why: str, now: float) -> Stop:
-    """`stop` when nothing that was said counts any more: of a stop a doubt is left."""
+    """`stop` when nothing that was said counts any more: if that was a stop, a doubt remains."""
     if stop.said is TriState.TRUE or stop.doubt is not None:
         return doubted(stop, why, now)
     return NOTHING

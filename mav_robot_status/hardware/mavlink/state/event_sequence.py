@@ -25,11 +25,11 @@ ASKABLE: Final = 20
 """The events that PX4 keeps."""
 HALF: Final = 1 << 15
 BACK_MS: Final = 10_000
-"""An event this much older than the newest one is of another run of the autopilot, as libevents has it."""
+"""An event this much older than the newest one is from another run of the autopilot, as in libevents."""
 
 
 class Arrival(Enum):
-    """What an event is to those before it."""
+    """How an event relates to those before it."""
 
     NEWEST = "newer than all others"
     LATE = "missing until now, while a newer one has arrived"
@@ -140,5 +140,5 @@ def _newest_of(events: Mapping[int, Event], newest: int) -> Mapping[int, Event]:
 
 
 def _run_to(newest: int, events: Mapping[int, Event]) -> int:
-    """How many events up to the newest one are there without a gap."""
+    """The number of events up to the newest one without a gap."""
     return next(back for back in range(KEPT + 1) if (newest - back) & 0xFFFF not in events)

@@ -113,7 +113,7 @@ def tells_armed(heartbeat: Heartbeat) -> bool:
 
 
 def is_ardupilots_own(message: HighLatency2) -> bool:
-    """Whether ArduPilot itself made this message, by all that it always sends alike: then `custom0` is base_mode."""
+    """Whether ArduPilot itself made this message, by the values that it always sends: `custom0` is then base_mode."""
     return (
         message.autopilot == MAV_AUTOPILOT_ARDUPILOTMEGA
         and bool(message.custom0 & MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
@@ -133,7 +133,7 @@ def armed_in(message: HighLatency2) -> TriState:
 
 
 def is_late(before: HighLatency, message: HighLatency2) -> bool:
-    """Whether a message is older than the latest one: a satellite delivers some late. After a reboot none is.
+    """Whether a message is older than the latest one: a satellite delivers some late. A message after a reboot is not.
 
     A step back of the clock counts as a reboot when the next message confirms it: see `doubting`.
     """

@@ -21,7 +21,7 @@ TERMINATING: Final = 1.5
 
 
 TOGETHER: Final = 2.0
-"""Seconds before the state CRITICAL in which an event tells of the same failsafe: the HEARTBEAT follows it."""
+"""Seconds by which an event may precede the state CRITICAL of the same failsafe: the HEARTBEAT follows it."""
 CLEARED: Final = 1.5
 """Seconds after a text that ends a failsafe in which a HEARTBEAT may be older than that end."""
 
@@ -68,7 +68,7 @@ def clear(latches: Latches, codes: tuple[int, ...]) -> Latches:
 
 
 def calmed(latches: Latches, critical_since: float) -> Latches:
-    """`latches` after a state CRITICAL has ended: events tell of the failsafe that has begun and ended with it."""
+    """`latches` after a state CRITICAL has ended: the failsafe that events have announced with it ends too."""
     return {
         code: latch for code, latch in latches.items() if code not in EVENTS or latch.last < critical_since - TOGETHER
     }

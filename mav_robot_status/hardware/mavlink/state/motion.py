@@ -63,7 +63,7 @@ def moved(motion: Motion, speed: float | None, rate: float, armed: bool, options
     value, fast, slow = motion.value, motion.fast_since, motion.slow_since
     on = options.v_on if armed else options.v_on_disarmed
     if value is TRUE and fast is not None and slow is None and (rate > RATE_ON or speed > on):
-        motion.speed, motion.at = speed, now  # it goes on moving: most samples of a flight
+        motion.speed, motion.at = speed, now  # it still moves: most samples of a flight
         return True
     was_measured, motion.speed, still = motion.speed is not None, speed, motion.still_since
     motion.value = settled(motion, now)

@@ -26,11 +26,11 @@ SEVERAL: Final = 3  # motors that all leave their stop value when armed: only a 
 DEMAND: Final = 15  # %: VFR_HUD.throttle from which an output at stop is suspicious
 HOLD: Final = 1.0  # s
 SWITCHED_OFF: Final = 1.5  # s: longer than the heartbeat that shows a disarm may be late
-FOLLOWS: Final = 0.2  # relative: as much may the pulse per percent of throttle differ at two throttles
-LOW_THROTTLE, HIGH_THROTTLE = 60, 75  # %: the two throttles are on either side
+FOLLOWS: Final = 0.2  # relative: the pulse per percent of throttle may differ by this much at two throttles
+LOW_THROTTLE, HIGH_THROTTLE = 60, 75  # %: one of the throttles is at most the first, the other at least the second
 LEAST_SLOPE: Final = 5.0  # us per percent: no control surface is that far off at such a throttle
 FLYING: Final = 5.0  # m/s: a plane without power that is this fast sinks or slows down
-LOSS: Final = 0.5  # m/s: by as much at least
+LOSS: Final = 0.5  # m/s: it does so by at least this much
 BEATS_APART: Final = 3.5  # s: a stop value is learnt only between two disarmed heartbeats this close
 GROWTH: Final = 0.5  # m/s: such an increase of speed while held shows that the vehicle is driven
 STRAIGHT: Final = 0.15  # rad/s: a rover that turns faster may be driven by a channel that is not the assumed one
@@ -54,7 +54,7 @@ ASSUMED_CHANNELS: Final[Mapping[int, tuple[int, ...]]] = {
 LIFT: Final = (5, 6, 7, 8)
 """The default channels of the lift motors of a QuadPlane, whose type in the HEARTBEAT is that of a plane."""
 STOPS_NEAR: Final = {Family.ROVER: (1400, 1600), Family.SUB: (1400, 1600)}
-"""Where a stop value is that was not learnt, us: of motors that reverse. Of all others: near the low end."""
+"""The range of a stop value that was not learnt, us: for motors that reverse. For all others it is LOW_END."""
 LOW_END: Final = (LEAST_PULSE, 1250)
 
 Outputs = tuple[int, ...]
@@ -227,7 +227,7 @@ def is_at_stop(watch: Watch, vehicle_type: int) -> bool:
 
 
 def may_drive(watch: Watch, family: Family, vehicle_type: int) -> bool:
-    """Whether a motor output is off its stop value, learnt or as it usually is. Not a proof."""
+    """Whether a motor output is off its stop value: the learnt one, else the usual range. Not a proof."""
     low, high = STOPS_NEAR.get(family, LOW_END)
     for c in channels(watch, vehicle_type)[0]:
         value = watch.values[c - 1] if c <= len(watch.values) else 0

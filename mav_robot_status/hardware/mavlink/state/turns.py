@@ -1,4 +1,4 @@
-"""Two senders that speak in turn on one way: a value that goes to and fro faster than one vehicle changes it."""
+"""Detects two senders that speak in turn on one way: a value alternates faster than one vehicle changes it."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def is_armed(heartbeat: Heartbeat) -> bool:
 
 
 class Rule(NamedTuple):
-    """What one vehicle does not do: alternate between two values of this in so many runs within so many seconds."""
+    """What one vehicle does not do: alternate between two values of `of`, in `runs` runs within `within` seconds."""
 
     what: str
     of: Callable[[Heartbeat], Any]
     runs: int
     within: float
     one_may: bool
-    """Whether one sender may do it after all, if its sequence numbers show that it is one."""
+    """Whether one sender may do it, if its sequence numbers show that it is only one."""
 
 
 RULES: Final = (
@@ -41,7 +41,7 @@ RULES: Final = (
     Rule("HEARTBEAT.custom_mode", attrgetter("custom_mode"), 6, 3.0, True),
 )
 """No vehicle changes its type twice without a reboot. A person may arm, disarm and arm again within seconds, and turn
-a mode switch to and fro, but not as often as two senders do. A program may: then one count of sequence numbers goes on.
+a mode switch to and fro, but not as often as two senders do. A program may: then the sequence numbers are one count.
 """
 
 
@@ -54,7 +54,7 @@ class Turns:
         self._runs: tuple[list[tuple[Any, float, bool]], ...] = tuple([] for _ in RULES)
 
     def heard(self, heartbeat: Heartbeat, now: float, *, counted: bool = False) -> str | None:
-        """Note a heartbeat that differs from the one before. Returns what is said in turn, if two senders do that.
+        """Note a heartbeat that differs from the one before. Returns what alternates, if that shows two senders.
 
         `counted`: its sequence number continues the count of the one before.
         """

@@ -1,7 +1,7 @@
 """The state of one vehicle. Messages change it (`handlers`), time alone does not.
 
 It holds no clock and no socket, so a recording gives the same state as the live link did. Only the record itself
-changes; what it is made of, but for the observation, are values.
+changes. Its parts are values, except for the records that messages change in place.
 """
 
 from __future__ import annotations

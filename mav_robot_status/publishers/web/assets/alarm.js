@@ -38,7 +38,7 @@ export class Alarms {
     document.getElementById("acknowledge").addEventListener("click", () => this.acknowledge());
   }
 
-  /** Begin, or not: the gateway says which. */
+  /** Turn the alarms on or off, as the gateway says. */
   enable(on) {
     if (on === this.on) return;
     this.on = on;

@@ -31,7 +31,7 @@ function place(field, value) {
   return found < 0 ? field.looks.size : found;
 }
 
-/** Sorted by a column, then by name. A group is where its first member or itself would be, its members below it. */
+/** Sorted by a column, then by name. A group stands where its first member or the group itself would be, with its members below it. */
 export function sorted(robots, column = COLUMNS[0], down = false) {
   const keys = new Map(robots.map((robot) => [robot, column.of(robot)]));
   const byHandle = new Map(robots.map((robot) => [robot.line.handle, robot]));

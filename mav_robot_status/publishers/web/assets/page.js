@@ -9,7 +9,7 @@ import { chip, setText } from "./make.js";
 import { clock, LINK, looks, span } from "./words.js";
 
 const TOKEN = "mav-robot-status token";
-const LIST = "?all"; // the place of the list, also of a single robot
+const LIST = "?all"; // the address of the list, even if it has a single robot
 const at = (id) => document.getElementById(id);
 const seconds = () => performance.now() / 1000;
 
@@ -83,7 +83,7 @@ function render() {
   age();
 }
 
-/** While nothing arrives of the gateway, every robot is unknown. */
+/** While nothing arrives from the gateway, every robot is unknown. */
 function freeze() {
   const frozen = page.state === "lost" || page.standing !== null ? page.receivedStamp : null;
   for (const robot of page.robots.values()) Object.assign(robot, { frozen, staleAfter: page.staleAfter });

@@ -28,7 +28,7 @@ export class Robot {
     return this.heartbeatAge === null ? null : this.heartbeatAge + this.age + seconds() - this.at;
   }
 
-  /** Whether nothing new arrives of it, or of anything. */
+  /** Whether nothing new arrives about this robot, or about any robot. */
   stale() {
     return this.frozen !== null || (this.staleAfter !== null && this.age + seconds() - this.at > this.staleAfter);
   }
@@ -73,7 +73,7 @@ export function ids(line) {
   return line.system === null || line.system === undefined ? "" : `${line.system}.${line.component}`;
 }
 
-/** Ids, autopilot with its firmware, and type in one line; of a group its members. */
+/** Ids, autopilot with its firmware, and type in one line; for a group its members. */
 export function kind(line) {
   if (members(line).length) return ids(line);
   const autopilot = [line.vehicle?.autopilot, line.vehicle?.firmware].filter((part) => part).join(" ");

@@ -48,7 +48,7 @@ export class VehiclePage {
     at("why").replaceChildren(...FIELDS.map((field) => reason(field, explanation.fields?.[field.name] ?? {})));
   }
 
-  /** Show the current status, and of a group those of its members among `robots`. */
+  /** Show the current status; for a group also the statuses of its members among `robots`. */
   show(robot, robots) {
     this.parts = members(robot.line).map((handle) => robots.get(handle)).filter((part) => part);
     at("members").hidden = this.parts.length === 0;

@@ -13,7 +13,7 @@ export function looks(field, value) {
   return field.looks.get(value ?? null) ?? SAID.unknown;
 }
 
-/** What is said of a robot while nothing arrives of it, although its last status says otherwise. */
+/** The headline of a robot while nothing arrives about it, although its last status says otherwise. */
 export function gone(headline, stamp) {
   const sentences = [{ text: SAID.since, at: stamp }, { text: SAID.may_move }, { text: `${SAID.last}: ${headline.word}` }];
   return { ...headline, ...SAID.unknown, word: SAID.unknown.word.toUpperCase(), sentences, step: "", causes: [] };

@@ -88,7 +88,7 @@ def test_alternating_autopilots_are_two_and_a_replaced_one_is_not(ear: Ear) -> N
     ear.hear(COPTER, 1)
     assert ear.found.speakers[0].conflict == ""
     ear.hear(ROVER, 2)
-    assert "ARDUPILOTMEGA QUADROTOR and of ARDUPILOTMEGA GROUND_ROVER" in ear.found.speakers[0].conflict
+    assert "ARDUPILOTMEGA QUADROTOR and ARDUPILOTMEGA GROUND_ROVER" in ear.found.speakers[0].conflict
 
 
 def test_a_component_with_the_ids_of_the_autopilot_is_not_a_second_vehicle(ear: Ear) -> None:
@@ -103,7 +103,7 @@ def test_two_alternating_boot_clocks_are_two_autopilots(ear: Ear) -> None:
     ear.hear(attitude(1000), 1, A)
     assert ear.found.speakers[0].conflict == ""
     ear.hear(SystemTime(0, 61_000), 1, B)
-    assert ear.found.speakers[0].conflict == "clocks in turns that started 60 s apart"
+    assert ear.found.speakers[0].conflict == "alternating clocks that started 60 s apart"
 
 
 def test_reboots_and_paths_with_different_delays_are_one_autopilot(ear: Ear) -> None:

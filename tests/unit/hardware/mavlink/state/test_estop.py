@@ -154,7 +154,7 @@ def test_a_px4_that_does_not_show_its_kill_is_not_reported_released_without_evid
     assert flight.status.e_stopped is TriState.FALSE
     assert flight.send(version_of(1, 11, 3)).status.e_stopped is TriState.UNKNOWN
     why = flight.vehicle.handle.evidence["e_stopped"]
-    assert (why.rule, why.source) == ("PX4 before 1.12 shows a kill in words alone", "AUTOPILOT_VERSION 1.11.3")
+    assert (why.rule, why.source) == ("PX4 before 1.12 shows a kill only in texts", "AUTOPILOT_VERSION 1.11.3")
     assert flight.status.motion_possible is (TriState.TRUE if armed else TriState.FALSE)
     assert flight.text(KILL, 0).status.e_stopped is TriState.TRUE
     assert flight.text(RELEASED, 0).status.e_stopped is TriState.FALSE

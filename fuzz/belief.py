@@ -47,6 +47,9 @@ FATES: Final = ("arrives", "arrives", "arrives", "lost", "late", "twice")
 PAUSES: Final = (0.02, 0.1, 0.25, 0.5, 1.0, 1.6, 3.6, 11.0)
 LATE: Final = 0.7  # s
 KINDS: Final = (2, 10)  # quadrotor, rover
+STATES: Final = (4, 4, 5, 6, 8)  # ACTIVE, CRITICAL, EMERGENCY, FLIGHT_TERMINATION
+HIL: Final = 32
+"""MAV_MODE_FLAG_HIL_ENABLED."""
 FAR: Final = 60
 """The least distance of the sequence numbers of the two senders."""
 WORLD_STEPS: Final = 500
@@ -110,6 +113,8 @@ class Sender:
         self.who = who
         self.armed = who == TRUE_ONE
         self.mode = 3
+        self.state, self.flags = 4, 0
+        """MAV_STATE and further flags of base_mode while it is armed. Only the other sender changes them."""
         self.kind = KINDS[0]
         self.booted = now - 100.0 * (1 + 9 * who)
         self.ways: tuple[tuple[str, int], ...] = WAYS[who][0]
@@ -119,7 +124,9 @@ class Sender:
 
     def heartbeat(self) -> mav.Heartbeat:
         """What it says now."""
-        return mav.Heartbeat(self.mode, self.kind, 3, 217 if self.armed else 89, 4 if self.armed else 3, 3)
+        if not self.armed:
+            return mav.Heartbeat(self.mode, self.kind, 3, 89, 3, 3)
+        return mav.Heartbeat(self.mode, self.kind, 3, 217 | self.flags, self.state, 3)
 
 
 class World:
@@ -176,6 +183,11 @@ class World:
     def change_mode(self, who: int, mode: int) -> None:
         """A sender changes its mode."""
         self.senders[who].mode = mode
+
+    def claim(self, state: int, flags: int) -> None:
+        """The other sender says of itself that it is armed, and perhaps why it cannot move."""
+        other = self.senders[OTHER]
+        other.armed, other.state, other.flags = True, state, flags
 
     def move(self, who: int, place: int, forked: bool) -> None:
         """A sender is heard on other ways."""
@@ -274,8 +286,10 @@ def random_step(world: World, random: Random) -> tuple[str, tuple[Any, ...]]:
         return "beat", (who, fate)
     if dice < 0.88:
         return "stream", (who, fate)
-    if dice < 0.93:
+    if dice < 0.91:
         return "arm", (who, random.random() < 0.6)
+    if dice < 0.93:
+        return "claim", (random.choice(STATES), random.choice((0, 0, HIL)))
     if dice < 0.95:
         return "change_mode", (who, random.choice((3, 5)))
     if dice < 0.975:

@@ -18,6 +18,7 @@ from ..deadline import SOON, Deadline
 from .gateway_process import Gateway
 
 ARMED, ROVER, COPTER, ARDUPILOT, STANDBY, ACTIVE = 128, 10, 2, 3, 3, 4
+EMERGENCY, TERMINATION = 6, 8
 HEARTBEAT = 0
 HERE = "udpin:127.0.0.1:0"
 SAFE = {"drives_powered": False, "motion_possible": False, "e_stopped": True}
@@ -28,12 +29,14 @@ StartGateway = Callable[..., Gateway]
 class Vehicle:
     """A sender of heartbeats on one socket, with its own count of sequence numbers."""
 
-    def __init__(self, *, armed: bool, component: int = 1, count: int = 0, kind: int = ROVER) -> None:
+    def __init__(
+        self, *, armed: bool, component: int = 1, count: int = 0, kind: int = ROVER, state: int | None = None
+    ) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.mav = MAVLink(None, srcSystem=1, srcComponent=component)
         self.mav.seq = count
-        self.armed, self.kind = armed, kind
+        self.armed, self.kind, self.state = armed, kind, state
         self.to: Any = None
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
@@ -45,7 +48,8 @@ class Vehicle:
 
     def heartbeat(self) -> bytes:
         base_mode, state = (65 | ARMED, ACTIVE) if self.armed else (65, STANDBY)
-        return self.packed(MAVLink_heartbeat_message(self.kind, ARDUPILOT, base_mode, 0, state, 3))
+        said = state if self.state is None else self.state
+        return self.packed(MAVLink_heartbeat_message(self.kind, ARDUPILOT, base_mode, 0, said, 3))
 
     def send(self, data: bytes | None = None, via: Vehicle | None = None) -> float:
         """Send a heartbeat or these bytes, from the socket of another vehicle if it is given."""
@@ -147,6 +151,23 @@ def test_the_first_speaker_is_not_believed_against_an_armed_vehicle_elsewhere(
     assert unsafe(gate, told) == []
     assert found.status["mode"] == "UNKNOWN"
     assert forger.to == gate.address
+
+
+@pytest.mark.parametrize("state", [EMERGENCY, TERMINATION])
+def test_a_first_speaker_that_is_armed_and_cannot_move_is_not_believed_against_one_that_can(
+    state: int, gateway: StartGateway, vehicle: Callable[..., Vehicle]
+) -> None:
+    gate = gateway(HERE)
+    vehicle(armed=True, state=state, count=128).beating(gate.address)
+    gate.wait_for(lambda s: s["motion_possible"] is False)
+    real = vehicle(armed=True).beating(gate.address)
+    told = gate.wait_for(lambda s: s["motion_possible"] is None).at
+    lines_for(gate, 2)
+    real.silence()
+    lines_for(gate, 1.0)
+    real.beating(gate.address)
+    lines_for(gate, 2)
+    assert unsafe(gate, told) == []
 
 
 def test_a_dropout_of_the_vehicle_does_not_make_a_disarmed_sender_the_vehicle(

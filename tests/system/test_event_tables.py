@@ -155,7 +155,9 @@ def test_a_fleet_on_one_link_reads_the_table_once(
     gate = gateway("udpin:127.0.0.1:0", "--json", "none")
     vehicles = [autopilot(px4.READY, gate.address, files=FILES, system=number) for number in (1, 2, 3)]
     gate.wait_for_log(r"the table of its events is read")
-    wait_until(lambda: sum("it uses the table of events of another vehicle" in line for line in gate.log) == 2)
+    # one that offers its table late, on a busy machine, finds it in the cache
+    others = ("it uses the table of events of another vehicle", "the table of its events is in the cache")
+    wait_until(lambda: sum(other in line for line in gate.log for other in others) == 2)
     assert sum(bool(vehicle.heard("FILE_TRANSFER_PROTOCOL")) for vehicle in vehicles) == 1
     assert gate.stop() == 0
 

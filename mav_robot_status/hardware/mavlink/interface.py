@@ -39,7 +39,7 @@ from .settle import claimed, facts_of
 from .state import motion
 from .state.applet import is_word
 from .state.claims import CLOCKS, CONTINUES, COUNTED_APART, Claims, Outcome
-from .state.high_latency import stated
+from .state.high_latency import LEAST_TIMEOUT, stated
 from .state.latest_messages import SILENCE
 from .state.vehicle_state import begin, timeout_of
 
@@ -265,7 +265,7 @@ class MavlinkRobotHW(RobotHW):
                 claims.beside(beat[3], sequence, way, now)
                 self._settle_claims(tracked, now)
                 return
-            claims.lasts = timeout_of(state, self.options)
+            claims.lasts = max(LEAST_TIMEOUT, timeout_of(state, self.options))
             if claims.way is way and not follows(state, message):
                 return
         if tracked is not None and tracked.claims.way is not way:

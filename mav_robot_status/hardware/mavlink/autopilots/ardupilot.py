@@ -268,7 +268,7 @@ ARDUPILOT: Final = Autopilot(
         overrides_key=None,
         initialising=dict.fromkeys((Family.PLANE, Family.ROVER, Family.TRACKER), INITIALIZING),
     ),
-    states=States(uninit=Uninit.STARTING, standby_is_landed=True),
+    states=States(uninit=Uninit.STARTING, standby_is_landed=True, hides_armed=frozenset()),
     texts=Texts(
         rules=TEXTS,
         stop_text=StopText.READINESS,

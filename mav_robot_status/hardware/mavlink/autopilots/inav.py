@@ -1,7 +1,8 @@
 """INAV that announces itself as ArduPilot, which is its default.
 
-It uses ArduPlane's mode numbers for all but copters. Its SYS_STATUS differs from ArduPilot's: MOTOR_OUTPUTS is never
-present. INAV that announces itself as GENERIC uses the profile `generic`. Source: INAV, telemetry/mavlink.c.
+It uses ArduPlane's mode numbers for planes, rovers and boats, and ArduCopter's for all others. Its SYS_STATUS differs
+from ArduPilot's: MOTOR_OUTPUTS is never present. INAV that announces itself as GENERIC uses the profile `generic`.
+Source: INAV, telemetry/mavlink.c.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ LIMITS: Final = {Family.COPTER: 22, Family.PLANE: 23}
 def flight_mode(heartbeat: Heartbeat, family: Family, hints: ModeHints) -> FlightMode:
     """The mode by ArduPilot's numbers."""
     number = heartbeat.custom_mode
-    numbers_of = Family.COPTER if family is Family.COPTER else Family.PLANE
+    numbers_of = Family.PLANE if family in (Family.PLANE, Family.ROVER) else Family.COPTER
     if number >= LIMITS[numbers_of]:
         return FlightMode(RobotMode.UNKNOWN, other_name(number, hints), "INAV: no mapping for its mode")
     return look_up(ardupilot.MODES[numbers_of], number, f"INAV in ArduPilot's {numbers_of.value} numbers", hints)

@@ -5,10 +5,11 @@ Source: paparazzi/paparazzi, sw/airborne/modules/datalink/mavlink.c (commit 02d9
 `mavlink_common_message_handler`.
 
 The flags of base_mode give the mode; custom_mode is 15 (ArduPlane's GUIDED) in NAV and GUIDED, else 0. Armed means that
-the throttle is not killed, and CALIBRATING that the attitude is not valid. SYS_STATUS is a constant with four healthy
-sensors, so it shows neither faults nor readiness. A killed throttle is reported as disarmed; an emergency stop looks
-the same. MAV_CMD_SET_MESSAGE_INTERVAL is acknowledged and has no effect, so no messages are requested. Before there is
-an estimate, the speeds are zero. Paparazzi can be built to announce itself as ArduPilot. Then it is identified as INAV,
+the throttle is not killed and the attitude is valid. While the attitude is not valid the state is CALIBRATING, and the
+armed bit is not set even if the throttle is live. SYS_STATUS is a constant with four healthy sensors, so it shows
+neither faults nor readiness. A killed throttle is reported as disarmed; an emergency stop looks the same.
+MAV_CMD_SET_MESSAGE_INTERVAL is acknowledged and has no effect, so no messages are requested. Before there is an
+estimate, the speeds are zero. Paparazzi can be built to announce itself as ArduPilot. Then it is identified as INAV,
 whose SYS_STATUS lacks the same sensor.
 """
 
@@ -64,6 +65,7 @@ PAPARAZZI: Final[Autopilot] = GENERIC._replace(
     name="Paparazzi",
     recognition=Recognition(autopilots=frozenset({mavlink.MAV_AUTOPILOT_PPZ}), lacks=None),
     modes=Modes(flight_mode=flight_mode, overrides_key=None, initialising={}),
+    states=GENERIC.states._replace(hides_armed=frozenset({mavlink.MAV_STATE_CALIBRATING})),
     sensors=GENERIC.sensors._replace(weights={}, are_monitored=False),
     speeds=Speeds(
         zero=ZeroSpeed.GPS_HEALTHY,

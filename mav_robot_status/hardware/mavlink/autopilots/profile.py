@@ -89,6 +89,8 @@ class States(NamedTuple):
     uninit: Uninit
     standby_is_landed: bool
     """Whether STANDBY, while armed, means that the land detector reports landed."""
+    hides_armed: frozenset[int]
+    """The MAV_STATEs in which a heartbeat lacks the armed bit although the drives may be powered."""
 
 
 class Texts(NamedTuple):

@@ -47,7 +47,7 @@ def global_position(
     seen = state.latest
     seen.global_position = heard(seen, message, at, seen.global_position)
     vx, vy, vz = message.vx, message.vy, message.vz
-    still = not (vx or vy or vz)
+    still = not (vx or vy or (vz and state.family is not ROVER))
     nowhere = message.lat == 0 and message.lon == 0
     speed = _speed(state, vx / 100, vy / 100, vz / 100, still, nowhere, at, options)
     return _moved(state, state.motion, speed, at, options) and not corrected and _speed_counts_alike(state)
@@ -64,7 +64,8 @@ def local_position(state: VehicleState, message: mav.LocalPositionNed, now: Inst
     if is_fresh(seen.global_position, at, FRESH):
         return not corrected
     vx, vy, vz = message.vx, message.vy, message.vz
-    speed = _speed(state, vx, vy, vz, not (vx or vy or vz), False, at, options)
+    still = not (vx or vy or (vz and state.family is not ROVER))
+    speed = _speed(state, vx, vy, vz, still, False, at, options)
     return _moved(state, state.motion, speed, at, options) and not corrected and _speed_counts_alike(state)
 
 
@@ -150,8 +151,9 @@ def _speed(
     speed = math.hypot(x, y) if state.family is ROVER else math.hypot(x, y, z)
     status = state.latest.sys_status
     speeds = state.profile.speeds
-    if still and speeds.zero is not ALWAYS and not _counts_as_rest(speeds.zero, status, nowhere):
-        return None
+    if still and speeds.zero is not ALWAYS:
+        if not is_fresh(status, now, options.sys_status_timeout) or not _counts_as_rest(speeds.zero, status, nowhere):
+            return None
     if not state.heartbeats.armed and now < denied_until(state):
         return None
     return _measured(state, speed, z, nowhere, now, options) if speeds.reports_estimator else speed

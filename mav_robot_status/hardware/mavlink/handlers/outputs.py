@@ -42,6 +42,7 @@ def servo_output_raw(state: VehicleState, message: mav.ServoOutputRaw, now: Inst
         vehicle_type,
         state.heartbeats,
         hud.message.throttle if hud is not None and is_fresh(hud, at, FRESH) else None,
+        -math.inf if hud is None else hud.at,
         hud_speeds(state.latest)[0],
         at,
         outputs.hovers(family, vehicle_type, vtol_state(state)),
@@ -52,8 +53,8 @@ def servo_output_raw(state: VehicleState, message: mav.ServoOutputRaw, now: Inst
     if watch.driven:
         state.stop = estop.ended(before)
     elif before.said is not TriState.TRUE:
-        held, off = watch.held_since, watch.off_since
-        if held is not None and at >= held + outputs.HOLD and outputs.may_be_held(family, vehicle_type):
+        off = watch.off_since
+        if watch.held and outputs.may_be_held(family, vehicle_type):
             state.stop = estop.doubted(before, estop.HELD, at)
         elif off is not None and at >= off + outputs.SWITCHED_OFF:
             state.stop = estop.doubted(before, estop.SHUT_DOWN, at)

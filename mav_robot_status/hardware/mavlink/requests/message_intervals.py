@@ -100,6 +100,8 @@ class Requests:
         self._refused: set[int] = set()
         self._silent: set[int] = set()
         """Messages that did not arrive at all in the window before a round."""
+        self._heard: set[int] = set()
+        """Messages that arrived in that window."""
         self._empty: dict[int, int] = {}
         """How many windows ago each message arrived last, since the rounds began."""
         self._streams: deque[tuple[int, int]] = deque()
@@ -223,7 +225,7 @@ class Requests:
         while self._streams:
             message_id, rate = self._streams.popleft()
             stream = profile.requests.streams.get(message_id)
-            if stream is not None:
+            if stream is not None and not self._arrives(stream, profile):
                 return mav.RequestDataStream(rate, *self._ids, req_stream_id=stream, start_stop=1)
         while self._queue:
             command = self._queue[0]
@@ -297,6 +299,7 @@ class Requests:
         if missing:
             log.info("requesting from vehicle %d.%d: %s", *self._ids, ", ".join(w.name for w in missing))
         self._silent = {w.id for w in wanted if not self._came(w)}
+        self._heard = set(self._counts)
 
     def _missing(self, wanted: tuple[Wanted, ...]) -> Iterator[Wanted]:
         return (w for w in wanted if self._came(w) / LOOK < w.rate / 2)
@@ -305,9 +308,13 @@ class Requests:
         return max(self._counts.get(i, 0) for i in (what.id, what.instead) if i is not None)
 
     def _fall_back(self, message_id: float, interval_us: float) -> None:
-        """SET_MESSAGE_INTERVAL is unknown there: request the whole stream, if none of its messages arrives."""
+        """SET_MESSAGE_INTERVAL is unknown there: request the whole stream, if this message does not arrive."""
         if message_id in self._silent:
             self._streams.append((int(message_id), math.ceil(1e6 / interval_us)))
+
+    def _arrives(self, stream: int, profile: Autopilot) -> bool:
+        """Whether a message of this stream arrives: then a request would change its rate."""
+        return any(s == stream and i in self._heard for i, s in profile.requests.streams.items())
 
 
 def _is_met(command: _Command, message_id: int, rate: float) -> bool:

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from ....interface.status import RobotMode, TriState
-from ....mavlink.enumerations import (
-    MAV_STATE_BOOT,
-    MAV_STATE_CALIBRATING,
-    MAV_STATE_EMERGENCY,
-    MAV_STATE_FLIGHT_TERMINATION,
-    MAV_STATE_POWEROFF,
-    MAV_STATE_UNINIT,
-)
+from ....mavlink.enumerations import MAV_STATE_FLIGHT_TERMINATION, MAV_STATE_UNINIT
+from ..armed import NOT_MOVING_STATES
 from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 from .simulation import actuators_blocked
 
@@ -21,14 +15,12 @@ if TYPE_CHECKING:
     from ..facts import Facts
     from ..options import HardwareOptions
 
-NOT_MOVING_STATES: Final = frozenset(
-    {MAV_STATE_BOOT, MAV_STATE_CALIBRATING, MAV_STATE_EMERGENCY, MAV_STATE_POWEROFF, MAV_STATE_FLIGHT_TERMINATION}
-)
-
 
 def drives_powered(facts: Facts, options: HardwareOptions, stopped: TriState, why_stopped: Reason) -> Finding:
     """Armed, and neither blocked by hardware-in-the-loop nor stopped."""
     if not facts.armed:
+        if hides_armed(facts):
+            return UNKNOWN, Reason("a state in which the autopilot does not say whether it is armed", Source.STATE)
         return FALSE, Reason("disarmed", Source.BASE_MODE)
     if actuators_blocked(facts, options):
         return FALSE, Reason("hardware in the loop: actuators blocked", Source.BASE_MODE)
@@ -48,6 +40,8 @@ def motion_possible(
     state = facts.heartbeat.system_status
     if drives is FALSE:
         return FALSE, why_drives._replace(rule=f"drives_powered is false: {why_drives.rule}")
+    if hides_armed(facts):
+        return UNKNOWN, why_drives
     if state in NOT_MOVING_STATES:
         return FALSE, Reason("a state in which the vehicle does not move", Source.STATE)
     if is_initialising(facts):
@@ -59,6 +53,11 @@ def motion_possible(
     if state == MAV_STATE_UNINIT:
         return UNKNOWN, Reason("state UNINIT", Source.STATE)
     return TRUE, Reason("armed, not stopped, in a state that moves", Source.STATE)
+
+
+def hides_armed(facts: Facts) -> bool:
+    """Whether the heartbeat lacks the armed bit in a state in which that does not mean disarmed."""
+    return not facts.armed and facts.heartbeat.system_status in facts.kind.profile.states.hides_armed
 
 
 def is_initialising(facts: Facts) -> bool:

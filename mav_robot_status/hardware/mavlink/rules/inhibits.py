@@ -17,7 +17,7 @@ from ..autopilots.profile import Uninit
 from ..causes import TERMINATION_ANNOUNCED
 from ..identity import sensor_name
 from . import high_latency
-from .drives_powered import is_initialising
+from .drives_powered import hides_armed, is_initialising
 from .reason import FALSE, TRUE
 from .simulation import actuators_blocked, is_simulated
 
@@ -64,7 +64,7 @@ def inhibits(
 def _of_stop(facts: Facts, stopped: Finding) -> Iterator[Named]:
     """The inhibits without which a checked vehicle would have power."""
     value, why = stopped
-    if not facts.armed:
+    if not facts.armed and not hides_armed(facts):
         yield "DISARMED", None
     if value is TRUE:
         yield "E_STOPPED", facts.stop.text

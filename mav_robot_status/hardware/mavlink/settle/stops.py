@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 from ....interface.status import TriState
@@ -37,11 +38,7 @@ def motor_outputs(state: VehicleState, moment: Moment, options: HardwareOptions)
     watch = state.watch
     if watch.at is None or not state.heartbeats.armed:
         return NO_OUTPUTS
-    held = (
-        watch.held_since is not None
-        and moment.has_come(watch.held_since + outputs.HOLD)
-        and outputs.proves_stop(state.family, state.vehicle_type, vtol_state(state))
-    )
+    held = watch.held and outputs.proves_stop(state.family, state.vehicle_type, vtol_state(state))
     at_stop = state.latest.esc is not None and outputs.is_at_stop(watch, state.vehicle_type)
     return new(Outputs, (moment.is_within(watch.at + FRESH), watch.driven, held, at_stop))
 
@@ -52,7 +49,8 @@ def outputs_vetoed(state: VehicleState, moment: Moment, options: HardwareOptions
     if watch.held_since is None:
         return False
     speed, climb = hud_speeds(state.latest)
-    return outputs.is_vetoed(watch, state.family, state.vehicle_type, speed, climb, state.turning)
+    turning = state.turning if moment.is_fresh(state.latest.attitude, FRESH) else math.inf
+    return outputs.is_vetoed(watch, state.family, state.vehicle_type, speed, climb, turning)
 
 
 def esc_turning(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:

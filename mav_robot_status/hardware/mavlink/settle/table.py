@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ....interface.status import TriState
 from ....mavlink.enumerations import MAV_LANDED_STATE_UNDEFINED, MAV_STANDARD_MODE_NON_STANDARD
+from ..armed import may_move
 from ..autopilots.modes import ModeHints
 from ..facts import (
     Cause,
@@ -24,6 +25,7 @@ from ..state import (
     text_assembly,
 )
 from ..state.claims import HOLD, LIVE, NEVER
+from ..state.high_latency import is_statement
 from ..state.latest_messages import FRESH
 from ..state.vehicle_state import timeout_of
 from .causes import arming, explained, faults, latched, reported_by_parts, sys_status
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from ....mavlink.definitions import Heartbeat
     from ..moment import Moment
     from ..options import HardwareOptions
+    from ..state.claims import Claim
     from ..state.vehicle_state import VehicleState
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
@@ -119,7 +122,7 @@ def mode_hints(state: VehicleState, moment: Moment, options: HardwareOptions) ->
 
 
 def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Claimed:
-    """Whether another sender claims the ids. Disarmed is doubtful while any live claim is armed."""
+    """Whether another sender claims the ids. "Not able to move" is doubtful while any live claim says otherwise."""
     claims = state.claims
     conflict = claims.conflict
     mine = claims.mine
@@ -132,12 +135,20 @@ def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Cl
         all_disarmed = armed is FALSE and moment.has_come(claims.armed_at + HOLD)
         one_mode = moment.has_come(claims.differed_at + HOLD)
         return new(Claimed, (since, True, all_armed, all_disarmed, one_mode))
-    if _armed(state) is FALSE and (
+    if _is_at_rest(state, mine) and (
         (mine is not None and not moment.has_come(mine.doubt_at + LIVE))
         or any(not moment.has_come(c.doubt_at + LIVE) for c in claims.others.values())
     ):
         return DOUBTED
     return UNDISPUTED
+
+
+def _is_at_rest(state: VehicleState, mine: Claim | None) -> bool:
+    """Whether the selected sender says disarmed, or armed in a state without motion."""
+    armed = _armed(state)
+    return armed is FALSE or (
+        armed is TRUE and mine is not None and not is_statement(mine.heartbeat) and not may_move(mine.heartbeat)
+    )
 
 
 def _armed(state: VehicleState) -> TriState:

@@ -4,7 +4,8 @@ A *way* is a channel on which frames arrive; here it is any hashable value. One 
 only its frames change the state. The heartbeats of every other sender of the same ids are *claims*. They change no
 state, but they are compared with the selected way:
 
-- A live claim that is armed makes a disarmed selected way doubtful at once.
+- A live claim of a vehicle that may move makes a selected way doubtful at once that says disarmed, or in its state that
+  motion is not possible.
 - Claims are a conflict if they differ for longer than a slow way explains, or in what no vehicle changes.
 - A silent way is replaced by one that does not contradict it. One that does has to wait for a link loss.
 - A HIGH_LATENCY2 is a statement as a HEARTBEAT is (`high_latency.stated`). It comes seldom, so it counts for longer; it
@@ -21,9 +22,10 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from ....values import NamedTuple
+from ..armed import is_armed, may_move
 from .boot_clock import APART
 from .high_latency import LEAST_TIMEOUT, is_statement, tells_armed
-from .turns import Turns, is_armed
+from .turns import Turns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
@@ -107,10 +109,10 @@ class Claim:
         self, way: Any, heartbeat: Heartbeat, sequence: int, at: float, counts_from: float | None = None
     ) -> None:
         self.way, self.heartbeat, self.at = way, heartbeat, at
-        self.armed_at = (at if counts_from is None else counts_from) if is_armed(heartbeat) else NEVER
-        """When the sender with this count of sequence numbers said armed. NEVER if it has said disarmed since."""
+        self.armed_at = (at if counts_from is None else counts_from) if may_move(heartbeat) else NEVER
+        """When the sender with this count of sequence numbers said that it may move. NEVER if it took that back."""
         self.former_at = NEVER
-        """When a sender with another count last said armed. Only time ends that."""
+        """When a sender with another count last said that. Only time ends that."""
         self.copied = False
         """Whether a router copied it from another way: then it is not a claim of its own."""
         self.booted: float | None = None
@@ -129,7 +131,7 @@ class Claim:
 
     @property
     def doubt_at(self) -> float:
-        """When anyone on this way last said armed and did not say disarmed since."""
+        """When anyone on this way last said that the vehicle may move, and did not take that back since."""
         return self.armed_at if self.armed_at > self.former_at else self.former_at
 
     def follow(self, sequence: int) -> None:
@@ -149,7 +151,7 @@ class Claim:
         if not continues:
             self.former_at = max(self.former_at, self.armed_at)
         if tells_armed(heartbeat):
-            self.armed_at = (at if counts_from is None else counts_from) if is_armed(heartbeat) else NEVER
+            self.armed_at = (at if counts_from is None else counts_from) if may_move(heartbeat) else NEVER
         if sequence != self.number:
             self.number, self.counts = sequence, True
         self.broken, self.heartbeat, self.at = False, heartbeat, at
@@ -228,7 +230,7 @@ class Claims(Generic[C]):
             if sequence != mine.number:
                 mine.number, mine.counts = sequence, True
             mine.at = at
-            if is_armed(heartbeat):  # also if it was a copy before: this is not a copy
+            if may_move(heartbeat):  # also if it was a copy before: this is not a copy
                 mine.armed_at = self._counts_from(heartbeat, at)
         else:
             self._changed(mine, heartbeat, sequence, now)
@@ -253,9 +255,9 @@ class Claims(Generic[C]):
         mine.broken = self.broken
         counts_from = self._counts_from(heartbeat, now.mono)
         continues = mine.hear(heartbeat, sequence, now.mono, counts_from, signed=self.is_signed(now.mono))
-        if is_statement(heartbeat) and is_armed(before) and not continues:
+        if is_statement(heartbeat) and may_move(before) and not continues:
             mine.former_at = max(mine.former_at, counts_from)
-        if _kind(heartbeat) != _kind(before) and is_armed(before) and not mine.armed:
+        if _kind(heartbeat) != _kind(before) and may_move(before) and not may_move(heartbeat):
             mine.former_at = armed_at  # no vehicle becomes another one
         if mine.armed and not is_armed(before) and not continues and now.mono - armed_at <= HOLD:
             self.contradict("two counts of sequence numbers, armed and disarmed", mine.way, now)
@@ -455,7 +457,8 @@ class Claims(Generic[C]):
         for key, claim in self.others.items():
             if claim.copied or at - claim.at > LIVE or is_statement(claim.heartbeat):
                 continue
-            if claim.armed != mine.armed or (key == claim.way and _stance(claim.heartbeat) != _stance(mine.heartbeat)):
+            moves = may_move(claim.heartbeat) != may_move(mine.heartbeat)
+            if moves or (key == claim.way and _stance(claim.heartbeat) != _stance(mine.heartbeat)):
                 differing = claim
                 if key == claim.way == speaker and _kind(claim.heartbeat) != _kind(mine.heartbeat):
                     self.contradict("HEARTBEAT.type and autopilot differ", claim.way, now)
@@ -464,8 +467,7 @@ class Claims(Generic[C]):
         elif self._apart_since is None:
             self._apart_since = at
         elif at - self._apart_since >= PERSISTS:
-            armed = differing.armed != mine.armed
-            self.contradict(f"{'armed and disarmed' if armed else 'two modes'} at the same time", differing.way, now)
+            self.contradict(f"{_difference(differing.heartbeat, mine.heartbeat)} at the same time", differing.way, now)
 
 
 def _kind(heartbeat: Heartbeat) -> tuple[int, int]:
@@ -478,11 +480,18 @@ def _stance(heartbeat: Heartbeat) -> tuple[int, ...]:
     return heartbeat.autopilot, heartbeat.type, heartbeat.base_mode, heartbeat.custom_mode
 
 
+def _difference(one: Heartbeat, other: Heartbeat) -> str:
+    """In what two senders differ."""
+    if is_armed(one) != is_armed(other):
+        return "armed and disarmed"
+    return "two states" if may_move(one) != may_move(other) else "two modes"
+
+
 def _disarms(heartbeat: Heartbeat, before: Heartbeat) -> bool:
-    """Whether a heartbeat ends the claim that a vehicle is armed, or that it may be."""
+    """Whether a heartbeat ends the claim that a vehicle can move, or that it may be armed."""
     if tells_armed(before):
-        return is_armed(before) and not is_armed(heartbeat)
-    return tells_armed(heartbeat) and not is_armed(heartbeat)
+        return may_move(before) and not may_move(heartbeat)
+    return tells_armed(heartbeat) and not may_move(heartbeat)
 
 
 def _are_apart(one: float | None, other: float | None) -> bool:

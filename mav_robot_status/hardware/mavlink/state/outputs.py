@@ -24,7 +24,7 @@ AT_STOP: Final = 5  # us: as near as this is held
 LEAST_PULSE: Final = 800  # us: a lower output is switched off, and proves nothing
 SEVERAL: Final = 3  # motors that all leave their stop value when armed: only a multirotor does that
 DEMAND: Final = 15  # %: VFR_HUD.throttle from which an output at stop is suspicious
-HOLD: Final = 1.0  # s
+HOLD: Final = 0.95  # s: one second, less the jitter of a stream
 SWITCHED_OFF: Final = 1.5  # s: longer than the heartbeat that shows a disarm may be late
 FOLLOWS: Final = 0.2  # relative: the pulse per percent of throttle may differ by this much at two throttles
 LOW_THROTTLE, HIGH_THROTTLE = 60, 75  # %: one of the throttles is at most the first, the other at least the second
@@ -82,6 +82,8 @@ class Watch:
     slope: float = 0.0
     """Of an assumed throttle channel: us per percent of a high throttle. 0: none seen."""
     held_since: float | None = None
+    held: bool = False
+    """Whether the outputs were at stop again after HOLD, and a throttle that arrived in between was demanded."""
     speed_then: float = 0.0
     """Speed over ground of a rover or a plane when the hold began, m/s."""
     at: float | None = None
@@ -116,17 +118,20 @@ def heard_outputs(
     vehicle_type: int,
     heartbeats: HeartbeatHistory,
     throttle: float | None,
+    throttle_at: float,
     speed: float,
     now: float,
     hovers: bool = False,
 ) -> None:
-    """Process a SERVO_OUTPUT_RAW; `throttle` in percent, None if it is not fresh.
+    """Process a SERVO_OUTPUT_RAW; `throttle` in percent, None if it is not fresh; `throttle_at`: when it arrived.
 
+    A throttle from before a stop of its own would make a vehicle seem held that only rests.
     `hovers`: motors that are switched off would let the vehicle fall, so the autopilot does not do that by itself.
     """
     watch.at, watch.values = now, values
     if not heartbeats.armed:
         watch.candidate, watch.driven, watch.held_since, watch.off_since = values, False, None, None
+        watch.held = False
         return
     motors, assumed = channels(watch, vehicle_type)
     known = _distances(watch, motors)
@@ -145,9 +150,11 @@ def heard_outputs(
     if not watch.proved:
         watch.proved = _is_proof(watch, known, motors, assumed, vehicle_type, throttle if demanded else None)
     if not (at_stop and demanded and watch.proved and watch.driven_seen):
-        watch.held_since = None
+        watch.held_since, watch.held = None, False
     elif watch.held_since is None:
         watch.held_since, watch.speed_then = now, speed
+    elif now >= watch.held_since + HOLD and throttle_at > watch.held_since:
+        watch.held = True
     watch.driven = (off_stop and (watch.proved or not assumed)) or lifting
     watch.driven_seen = watch.driven_seen or watch.driven
     if not (hovers and at_stop and watch.driven_seen):
@@ -206,7 +213,7 @@ def heartbeat_arrived(
     if heartbeats.armed:
         if before is not None and not before.armed:
             watch.candidate, watch.held_since, watch.off_since = (), None, None
-            watch.driven = watch.driven_seen = False
+            watch.driven = watch.driven_seen = watch.held = False
         return
     candidate, watch.candidate = watch.candidate, ()
     if before is None or before.armed or not candidate or not outputs_enabled:
@@ -264,7 +271,8 @@ def is_vetoed(watch: Watch, family: Family, vehicle_type: int, speed: float, cli
     """Whether the motion shows that the vehicle is driven although the outputs seem held.
 
     A stopped copter falls, a stopped rover coasts, a stopped plane sinks or slows down. `speed` over ground and `climb`
-    in m/s. `turning` in rad/s: one motor of a rover with a motor on each side may stand still during a turn.
+    in m/s. `turning` in rad/s, infinite if it is not known: one motor of a rover with a motor on each side may stand
+    still during a turn.
     """
     grown = speed - watch.speed_then
     if family is not ROVER:

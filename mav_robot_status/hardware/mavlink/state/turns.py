@@ -5,8 +5,8 @@ from __future__ import annotations
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final
 
-from ....mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
 from ....values import NamedTuple
+from ..armed import is_armed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,11 +17,6 @@ PERIOD: Final = 0.9
 """Seconds between two heartbeats of one autopilot, with a margin. Quicker turns are those of one sender."""
 TURN: Final = 10.0
 """Seconds within which two autopilots with the same ids alternate."""
-
-
-def is_armed(heartbeat: Heartbeat) -> bool:
-    """Whether a heartbeat says armed."""
-    return bool(heartbeat.base_mode & MAV_MODE_FLAG_SAFETY_ARMED)
 
 
 class Rule(NamedTuple):

@@ -109,9 +109,10 @@ def test_a_configured_override_wins_over_every_table() -> None:
         (Family.PLANE, 23, (UNKNOWN, "CMODE(23)")),
         (Family.COPTER, 5, (MANUAL, "LOITER")),
         (Family.COPTER, 22, (UNKNOWN, "CMODE(22)")),
+        (Family.OTHER, 5, (MANUAL, "LOITER")),
     ],
 )
-def test_inav_uses_the_plane_modes_for_all_types_except_copters(
+def test_inav_uses_the_plane_modes_for_planes_rovers_and_boats_alone(
     family: Family, number: int, expected: tuple[RobotMode, str]
 ) -> None:
     assert mode_of(number, INAV, family) == expected

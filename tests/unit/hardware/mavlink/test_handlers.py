@@ -291,6 +291,19 @@ def test_a_zero_velocity_is_not_an_estimate_for_inav_without_gps() -> None:
         assert moving(flight, lambda: hud(0, 0)) is expected
 
 
+def test_a_climb_without_a_speed_is_not_rest_of_an_inav_rover_without_gps() -> None:
+    bits = FITTED & ~MOTORS & ~GPS
+    flight = Flight(vehicle_type=ROVER).set(present=bits, enabled=bits, health=bits)
+    assert moving(flight, lambda: here(flight, 0, 0, 2)) is UNKNOWN
+
+
+def test_a_zero_velocity_is_not_an_estimate_while_sys_status_is_old() -> None:
+    flight = rover().hb(armed=True, state=ACTIVE)
+    assert moving(flight, lambda: here(flight, 0, 0, 0)) is FALSE
+    flight.stop("sys_status").wait(8)
+    assert flight.status.in_motion is UNKNOWN
+
+
 def test_a_disarmed_aircraft_at_rest_is_stationary() -> None:
     flight = px4()
     assert moving(flight, lambda: local(flight, 0, 0, 0)) is FALSE

@@ -627,6 +627,20 @@ def test_no_order_of_messages_calls_a_vehicle_safe_that_says_armed_by_high_laten
         assert sky.wait(pause).drives_powered is not FALSE
 
 
+def test_the_first_message_after_heartbeats_is_held_against_a_disarmed_sender_for_a_minute() -> None:
+    sky = Sky()
+    for _ in range(5):
+        sky.beat("truth", armed=True)
+        sky.wait(1.0)
+    sky.wait(5.0)
+    sky.send(ardupilot(ARMED), "truth")
+    for second in range(50):
+        sky.beat("forger")
+        if second % 5 == 4:
+            sky.send(ardupilot(ARMED), "truth")
+        assert sky.wait(1.0).drives_powered is not FALSE
+
+
 @pytest.mark.parametrize("message", [ardupilot(), px4()])
 def test_a_statement_equals_no_heartbeat_that_can_arrive(message: mav.HighLatency2) -> None:
     statement = stated(message)

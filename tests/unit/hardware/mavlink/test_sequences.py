@@ -416,6 +416,7 @@ def test_the_throttle_channel_shows_the_stop_of_a_rover_and_its_end() -> None:
     """Q28"""
     flight = rover()
     outputs = Outputs(flight, [1500, 0, 1500])
+    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0.0, 0.0, 0.0), hz=2)
     flight.wait(15)
     flight.hb(armed=True, state=ACTIVE, mode=15)
     outputs.set([1500, 0, 1655], 31)
@@ -432,6 +433,33 @@ def test_the_throttle_channel_shows_the_stop_of_a_rover_and_its_end() -> None:
     outputs.set([1500, 0, 1904], 80)
     flight.wait(0.5)
     assert flight.status.e_stopped is FALSE
+
+
+def test_without_attitude_an_assumed_throttle_channel_at_rest_does_not_show_a_stop() -> None:
+    """A rover with a motor on each side turns about the side that stands still."""
+    flight = rover()
+    outputs = Outputs(flight, [1500, 0, 1500])
+    flight.wait(15)
+    flight.hb(armed=True, state=ACTIVE, mode=15)
+    outputs.set([1655, 0, 1655], 31)
+    flight.wait(5)
+    outputs.set([1655, 0, 1500], 31)
+    assert {status.e_stopped for status in flight.wait(5)} == {FALSE, UNKNOWN}
+
+
+def test_a_rover_that_comes_to_rest_while_vfr_hud_is_lost_is_not_stopped() -> None:
+    flight = rover()
+    outputs = Outputs(flight, [1500, 0, 1500])
+    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0.0, 0.0, 0.0), hz=2)
+    flight.wait(15)
+    flight.hb(armed=True, state=ACTIVE, mode=0)
+    outputs.set([1500, 0, 1655], 40)
+    flight.wait(5)
+    flight.stop("vfr_hud")
+    outputs.set([1500, 0, 1500], 0)
+    seen = flight.wait(10)
+    assert TRUE not in {status.e_stopped for status in seen}
+    assert FALSE not in {status.drives_powered for status in seen}
 
 
 def test_a_px4_that_becomes_not_ready_has_not_rebooted() -> None:

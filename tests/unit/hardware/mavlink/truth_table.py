@@ -73,4 +73,4 @@ def _would_be_ready(state: VehicleState, status: mav.SysStatus) -> bool:
 def _watch(value: TriState, at: Instant) -> outputs.Watch:
     if value is TriState.TRUE:  # the column says T for driven, F for held
         return outputs.Watch(driven=True, at=at.mono)
-    return outputs.Watch(held_since=at.mono - outputs.HOLD, at=at.mono)
+    return outputs.Watch(held_since=at.mono - outputs.HOLD, held=True, at=at.mono)

@@ -57,6 +57,17 @@ def test_a_constant_sys_status_is_not_evidence_of_no_error() -> None:
     assert flight.hb(armed=True, state=4).status.e_stopped is TriState.UNKNOWN
 
 
+def test_without_a_valid_attitude_nobody_knows_whether_the_throttle_is_live() -> None:
+    flight = paparazzi(PLANE).hb(armed=True, state=4)
+    flight.wait(2)
+    flight.hb(armed=False, state=2).wait(3)
+    assert (flight.status.drives_powered, flight.status.motion_possible) == (TriState.UNKNOWN, TriState.UNKNOWN)
+    assert "DISARMED" not in flight.inhibits
+    flight.hb(armed=False, state=3).wait(3)
+    assert (flight.status.drives_powered, flight.status.motion_possible) == (TriState.FALSE, TriState.FALSE)
+    assert "DISARMED" in flight.inhibits
+
+
 def test_a_speed_of_zero_is_not_evidence_of_standstill() -> None:
     flight = paparazzi().hb(armed=True, state=4)
     flight.stream("local", lambda: mav.LocalPositionNed(flight.boot_ms, 0.0, 0.0, 0.0), hz=4)

@@ -168,6 +168,14 @@ def test_the_rate_of_an_active_stream_is_not_changed() -> None:
     assert refused(requests, MAV_RESULT_UNSUPPORTED, ONLY_RATES, four_hz) is None
 
 
+def test_a_stream_of_which_another_message_arrives_is_not_requested() -> None:
+    requests = Requests(1, 1, 100.0)
+    for tick in range(15):
+        requests.arrived(2, 100.0 + tick / 5)
+    system_time, estimator = Wanted(2, "SYSTEM_TIME", 1.0, 24), Wanted(193, "EKF_STATUS_REPORT", 0.5, 34)
+    assert refused(requests, MAV_RESULT_UNSUPPORTED, ONLY_RATES, (system_time, estimator)) is None
+
+
 @pytest.mark.parametrize(("result", "profile"), [(FAILED, ARDUPILOT), (MAV_RESULT_UNSUPPORTED, PX4)])
 def test_other_autopilots_get_no_stream_request(requests: Requests, result: int, profile: Autopilot) -> None:
     assert not isinstance(refused(requests, result, profile), RequestDataStream)

@@ -54,10 +54,12 @@ class Air:
         armed: bool = False,
         mode: int = 3,
         vehicle_type: int = 2,
+        state: int = 4,
+        flags: int = 0,
         sequence: int | None = None,
         ids: tuple[int, int] = (1, 1),
     ) -> bool:
-        message = mav.Heartbeat(mode, vehicle_type, 3, 217 if armed else 89, 4 if armed else 3, 3)
+        message = mav.Heartbeat(mode, vehicle_type, 3, 217 | flags if armed else 89, state if armed else 3, 3)
         return self.send(message, 0, way, sequence, ids)
 
     def attitude(self, way: Any, clock_ms: int, sequence: int | None = None) -> None:
@@ -70,6 +72,10 @@ class Air:
     @property
     def status(self) -> Any:
         return next(self.hw.vehicles).handle.status
+
+    @property
+    def errors(self) -> Any:
+        return next(self.hw.vehicles).handle.detail.errors
 
     @property
     def claims(self) -> Claims[Any]:
@@ -137,6 +143,64 @@ def test_disarmed_is_unknown_at_once_while_a_live_sender_elsewhere_is_armed(firs
     else:
         assert air.is_unknown()
     assert air.status.error_code == 0
+
+
+AT_REST = [{"state": 8}, {"state": 6}, {"flags": 32}]
+"""What an armed heartbeat says of a vehicle that does not move: FLIGHT_TERMINATION, EMERGENCY, HIL."""
+
+
+@pytest.mark.parametrize("says", AT_REST)
+def test_a_sender_that_was_heard_first_is_not_believed_that_an_armed_vehicle_elsewhere_is_stopped(says: Any) -> None:
+    air = Air()
+    air.beat("forger", armed=True, **says)
+    assert FALSE in (air.status.motion_possible, air.status.drives_powered)
+    air.wait(0.2)
+    air.beat("radio", armed=True)
+    assert air.is_unknown()
+    for _ in range(12):
+        air.wait(0.5)
+        air.beat("forger", armed=True, **says)
+        air.beat("radio", armed=True)
+        assert FALSE not in (air.status.motion_possible, air.status.drives_powered)
+        assert air.status.e_stopped is not TRUE
+    assert 9002 in [error.code for error in air.errors]
+
+
+@pytest.mark.parametrize("says", AT_REST)
+def test_a_dropout_of_an_armed_vehicle_does_not_make_a_sender_the_vehicle_that_calls_it_stopped(says: Any) -> None:
+    air = Air()
+    air.beat("radio", armed=True)
+    for _ in range(6):
+        air.wait(0.5)
+        assert not air.beat("forger", armed=True, **says)
+        assert air.status.motion_possible is TRUE
+
+
+def test_a_vehicle_on_two_ways_that_is_stopped_is_unknown_until_both_say_so() -> None:
+    air = Air()
+    for way in ("radio", "wifi"):
+        air.beat(way, armed=True)
+    air.wait(0.5)
+    air.beat("radio", armed=True, state=8)
+    assert air.is_unknown()
+    air.wait(0.3)
+    air.beat("wifi", armed=True, state=8)
+    assert (air.status.e_stopped, air.status.drives_powered) == (TRUE, FALSE)
+    assert 9002 not in [error.code for error in air.errors]
+
+
+def test_a_stop_in_the_state_that_does_not_continue_the_count_is_believed_after_the_armed_heartbeat_is_old() -> None:
+    air = Air()
+    air.beat(armed=True, sequence=10)
+    air.wait(1.0)
+    air.beat(armed=True, sequence=11)
+    air.wait(1.0)
+    air.beat(armed=True, state=8, sequence=200)
+    assert air.is_unknown()
+    for number in range(201, 204):
+        air.wait(1.0)
+        air.beat(armed=True, state=8, sequence=number)
+    assert air.status.e_stopped is TRUE
 
 
 def test_a_disagreement_that_lasts_is_a_conflict_until_some_time_after_one_is_silent(

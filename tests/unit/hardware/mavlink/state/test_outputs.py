@@ -6,7 +6,6 @@ from mav_robot_status.clock import Instant, later
 from mav_robot_status.hardware.mavlink.identity import family_of
 from mav_robot_status.hardware.mavlink.state.heartbeat_history import HeartbeatHistory, first_heartbeat, next_heartbeat
 from mav_robot_status.hardware.mavlink.state.outputs import (
-    HOLD,
     Watch,
     channels,
     heard_outputs,
@@ -40,12 +39,22 @@ class Machine:
         heartbeat_arrived(self.watch, after, before, enabled, self.type, self.now.mono)
         return self
 
-    def put(self, values: tuple[int, ...], throttle: float | None = 50, speed: float = 0.0, vtol: int = 0) -> Machine:
-        self.now = later(self.now, 0.5)
+    def put(
+        self,
+        values: tuple[int, ...],
+        throttle: float | None = 50,
+        speed: float = 0.0,
+        vtol: int = 0,
+        seconds: float = 0.5,
+        throttle_age: float = 0.1,
+    ) -> Machine:
+        self.now = later(self.now, seconds)
+        self.latest = values, throttle, speed, vtol
         assert self.heartbeats is not None
         padded = (*values, *(0,) * 16)[:16]
         falls = hovers(family_of(self.type), self.type, vtol)
-        heard_outputs(self.watch, padded, self.type, self.heartbeats, throttle, speed, self.now.mono, falls)
+        at = self.now.mono
+        heard_outputs(self.watch, padded, self.type, self.heartbeats, throttle, at - throttle_age, speed, at, falls)
         return self
 
     def learn(self, values: tuple[int, ...] = STOP) -> Machine:
@@ -55,11 +64,13 @@ class Machine:
         return self.beat(True).put(values)
 
     def judge(self, speed: float = 0.0, after: float = 0.0, turning: float = 0.0, climb: float = 0.0) -> TriState:
-        """TRUE held, FALSE driven, UNKNOWN neither."""
+        """TRUE held, FALSE driven, UNKNOWN neither. `after` so many seconds the same outputs arrive again."""
+        if after:
+            self.put(*self.latest, seconds=after)
         watch, family = self.watch, family_of(self.type)
         if watch.driven:
             return TriState.FALSE
-        if watch.held_since is None or self.now.mono + after < watch.held_since + HOLD:
+        if not watch.held:
             return TriState.UNKNOWN
         if is_vetoed(watch, family, self.type, speed, climb, turning) or not proves_stop(family, self.type, 0):
             return TriState.UNKNOWN
@@ -73,7 +84,21 @@ def test_a_motor_off_its_stop_value_is_driven() -> None:
 def test_outputs_back_at_stop_with_throttle_are_held_after_one_second() -> None:
     machine = Machine().learn().fly().put(STOP)
     assert machine.judge(after=0.9) is TriState.UNKNOWN
-    assert machine.judge(after=1.0) is TriState.TRUE
+    assert machine.judge(after=0.1) is TriState.TRUE
+
+
+def test_one_sample_at_stop_is_not_held_however_long_ago_it_is() -> None:
+    machine = Machine(ROVER).learn((0, 0, 1500)).fly((0, 0, 1655)).put((0, 0, 1500))
+    machine.put((0, 0, 1655), seconds=2.0)
+    assert machine.judge() is TriState.FALSE
+    assert not machine.watch.held
+
+
+def test_a_throttle_from_before_the_stop_does_not_make_a_resting_rover_held() -> None:
+    machine = Machine(ROVER).learn((0, 0, 1500)).fly((0, 0, 1655)).put((0, 0, 1500))
+    for age in (0.6, 1.1, 1.6, 2.1):
+        assert machine.put((0, 0, 1500), throttle_age=age).judge() is TriState.UNKNOWN
+    assert machine.put((0, 0, 1500), throttle_age=0.1).judge() is TriState.TRUE
 
 
 def test_outputs_at_stop_without_throttle_are_not_evidence() -> None:

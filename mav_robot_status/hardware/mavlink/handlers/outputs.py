@@ -80,11 +80,19 @@ def rc_channels(state: VehicleState, message: mav.RcChannels, now: Instant, opti
     """RC_CHANNELS: whether a switch of option 31 is in its stop position."""
     if not state.switches:
         return True
+    seen = False
     for channel, option in state.switches.items():
-        if option == estop.MOTOR_ESTOP and channel <= len(message) and STOP_POSITION <= message[channel - 1] < NO_PULSE:
-            state.stop_switch_at = now.mono
-            return False
+        if option == estop.MOTOR_ESTOP and channel <= len(message) and 0 < message[channel - 1] < NO_PULSE:
+            if message[channel - 1] >= STOP_POSITION:
+                state.stop_switch_at = now.mono
+                return False
+            seen = True
     state.stop_switch_at = -math.inf
+    before = state.stop
+    if seen:
+        state.stop = estop.switched_back(before, now.mono)
+    if state.stop is not before:
+        state.latest.unsettled = True
     return False
 
 

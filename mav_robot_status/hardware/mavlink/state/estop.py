@@ -47,6 +47,12 @@ REPEATED: Final = 35.0
 """Seconds after which a PreArm text that is no longer repeated (every 30 s) is over."""
 
 
+MOVED_SWITCH: Final = "MotorEStop"
+"""The text of a switch of option 31 when it moves (RC_Channel.cpp): `RC7: MotorEStop HIGH`."""
+MOVES: Final = 1.5
+"""Seconds after that text in which RC_CHANNELS may be older than the text."""
+
+
 class Stop(NamedTuple):
     """The stop according to texts and to the pre-arm check that includes it."""
 
@@ -71,6 +77,7 @@ LINK_LOST: Final = "a stop was reported, and the link has been lost since"
 UNDER_POWER: Final = "a stop was reported, and since then there are signs of power"
 UNANSWERED: Final = "a command to stop or to release has no clear acknowledgement"
 HELD: Final = "the motor outputs were held by a stop, and no release was seen"
+SWITCHED_BACK: Final = "a switch reported a stop, and is not in its stop position any more"
 SHUT_DOWN: Final = "the motors were switched off while armed, and have not been driven since"
 ARMED: Final = "a stop was reported before the arming, and this firmware may arm while it is stopped"
 APPLET_SILENT: Final = "the applet reported a stop, and has been silent since"
@@ -98,6 +105,13 @@ def doubted(stop: Stop, why: str, now: float) -> Stop:
     if stop.doubt is not None:
         return stop
     return Stop(text=stop.text, source=stop.source, last=now, doubt=why)
+
+
+def switched_back(stop: Stop, now: float) -> Stop:
+    """`stop` while no switch of option 31 is in its stop position: a text of one that says "engaged" is over."""
+    if stop.said is TriState.TRUE and MOVED_SWITCH in (stop.text or "") and now > stop.last + MOVES:
+        return doubted(stop, SWITCHED_BACK, now)
+    return stop
 
 
 def ended(stop: Stop) -> Stop:

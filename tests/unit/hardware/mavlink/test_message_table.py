@@ -204,6 +204,12 @@ def a_switch_is_moved() -> None:
         flight.send(mav.RcChannels(*[pulse] * 18)).wait(0.5)
 
 
+def a_switch_is_moved_back_and_the_text_of_its_release_is_lost() -> None:
+    flight = copter().send(mav.ParamValue(31.0, 0, 0, b"RC7_OPTION", 2)).hb(armed=True, state=ACTIVE)
+    flight.text("RC7: MotorEStop HIGH", 6).wait(3)
+    flight.send(mav.RcChannels(*[1000] * 18)).wait(0.5)
+
+
 def the_receiver_loses_its_fix_at_rest() -> None:
     flight = px4()
     flight.stream("gps", lambda: mav.GpsRawInt(0, 3), hz=4).wait(4)
@@ -376,6 +382,7 @@ STORIES: Final[list[Callable[[], Any]]] = [
     a_sensor_is_faulty_at_boot_and_the_clock_is_heard_late,
     the_applet_speaks_while_a_motor_is_driven_and_falls_silent,
     a_switch_is_moved,
+    a_switch_is_moved_back_and_the_text_of_its_release_is_lost,
     the_receiver_loses_its_fix_at_rest,
     a_copter_climbs_in_the_first_second_of_a_hold,
     *(partial(fly, seed) for seed in SEEDS),

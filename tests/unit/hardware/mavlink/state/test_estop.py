@@ -18,7 +18,7 @@ from mav_robot_status.hardware.mavlink.state.estop import (
 )
 from mav_robot_status.hardware.mavlink.state.heartbeat_history import HeartbeatHistory, first_heartbeat
 from mav_robot_status.interface import TriState
-from mav_robot_status.mavlink.definitions import Heartbeat, ParamValue, SysStatus
+from mav_robot_status.mavlink.definitions import Heartbeat, ParamValue, RcChannels, SysStatus
 
 from ..driver import ACTIVE, FITTED, MOTORS, PREARM, STANDBY, TERMINATED, copter, px4, version_of
 
@@ -186,6 +186,28 @@ def test_a_px4_that_shows_its_stops_is_trusted() -> None:
     assert flight.status.e_stopped is TriState.TRUE
     assert [(error.code, error.text) for error in flight.detail.errors] == [(1001, KILL)]
     assert flight.hb(state=ACTIVE).status.e_stopped is TriState.FALSE  # the release text was lost
+
+
+@pytest.mark.parametrize(
+    ("text", "pulse", "expected"),
+    [
+        ("RC7: MotorEStop HIGH", 1000, TriState.UNKNOWN),  # the text of the release was lost
+        ("RC7: MotorEStop HIGH", 1900, TriState.TRUE),
+        ("RC7: MotorEStop HIGH", 0, TriState.TRUE),  # no pulse
+        ("Arm: Motors Emergency Stopped", 1000, TriState.TRUE),  # a command or a script may have engaged it
+    ],
+)
+def test_a_stop_by_a_switch_is_in_doubt_when_the_switch_is_in_another_position(
+    text: str, pulse: int, expected: TriState
+) -> None:
+    flight = copter().send(ParamValue(31.0, 0, 0, b"RC7_OPTION", 2)).hb(armed=True, state=ACTIVE)
+    flight.stream("channels", lambda: RcChannels(*[1900] * 18), hz=4).wait(3)
+    assert flight.text(text, 6).status.e_stopped is TriState.TRUE
+    flight.stream("channels", lambda: RcChannels(*[pulse] * 18), hz=4)
+    assert {status.e_stopped for status in flight.wait(1.4)} == {TriState.TRUE}
+    flight.wait(2)
+    assert flight.status.e_stopped is expected
+    assert ("STOP_UNCERTAIN" in flight.inhibits) is (expected is TriState.UNKNOWN)
 
 
 @pytest.mark.parametrize(("option", "expected"), [(165.0, TriState.UNKNOWN), (153.0, TriState.FALSE)])

@@ -151,16 +151,17 @@ def _speed(
     speed = math.hypot(x, y) if state.family is ROVER else math.hypot(x, y, z)
     status = state.latest.sys_status
     speeds = state.profile.speeds
-    if still and speeds.zero is not ALWAYS:
-        if not is_fresh(status, now, options.sys_status_timeout) or not _counts_as_rest(speeds.zero, status, nowhere):
-            return None
+    if still and speeds.zero is not ALWAYS and not _counts_as_rest(speeds.zero, status, nowhere, now, options):
+        return None
     if not state.heartbeats.armed and now < denied_until(state):
         return None
     return _measured(state, speed, z, nowhere, now, options) if speeds.reports_estimator else speed
 
 
-def _counts_as_rest(zero: ZeroSpeed, status: Heard | None, nowhere: bool) -> bool:
+def _counts_as_rest(zero: ZeroSpeed, status: Heard | None, nowhere: bool, now: float, options: HardwareOptions) -> bool:
     """Whether a speed of exactly zero is an estimate."""
+    if not is_fresh(status, now, options.sys_status_timeout):
+        return False
     if zero is ESTIMATOR_HEALTHY:
         return not nowhere and status is not None and sensors.estimate_is_healthy(status.message)
     return _has_gps(status)

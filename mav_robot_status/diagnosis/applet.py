@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ..hardware.mavlink.autopilots import ARDUPILOT
 from ..hardware.mavlink.state.applet import EMERGENCY_STOP, SAFETY_SWITCH
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..hardware.mavlink.interface import MavlinkRobotHW
     from ..hardware.mavlink.state.vehicle_state import VehicleState
+    from ..json_object import JsonObject
 
 PAGE: Final = "docs/ardupilot-applet.md"
 WORDS: Final = {
@@ -27,11 +28,11 @@ def can_run(state: VehicleState | None) -> bool:
     return state is not None and state.profile is ARDUPILOT
 
 
-def reports(hw: MavlinkRobotHW, now: Instant) -> dict[str, dict[str, Any] | None]:
+def reports(hw: MavlinkRobotHW, now: Instant) -> dict[str, JsonObject | None]:
     """By handle, for each ArduPilot: the last report of its applet and its age in seconds; None if it is not heard."""
     return {t.handle.name: _report(t.state, now) for t in hw.vehicles if t.state is not None and can_run(t.state)}
 
 
-def _report(state: VehicleState, now: Instant) -> dict[str, Any] | None:
+def _report(state: VehicleState, now: Instant) -> JsonObject | None:
     word = state.applet
     return None if word is None else {"value": word.value, "age": round(now.mono - word.at, 3)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..clock import rfc3339
 from ..hardware.mavlink.px4_events.ids import ALL_MODES
@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from ..hardware.mavlink.px4_events import EventTable
     from ..hardware.mavlink.state.arming_report import Check
     from ..hardware.mavlink.state.vehicle_state import VehicleState
+    from ..json_object import JsonObject
 
 
-def reports(hw: MavlinkRobotHW) -> dict[str, list[dict[str, Any]]]:
+def reports(hw: MavlinkRobotHW) -> dict[str, list[JsonObject]]:
     """For each PX4 with a complete report, by handle: its checks that fail in any mode."""
     return {
         t.handle.name: _report(t.state)
@@ -26,12 +27,12 @@ def reports(hw: MavlinkRobotHW) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def _report(state: VehicleState) -> list[dict[str, Any]]:
+def _report(state: VehicleState) -> list[JsonObject]:
     mask, table = state.arming.can_arm, state.event_table
     return [] if mask is None else [_check(check, table) for check in failing(state.arming, mask, None)]
 
 
-def _check(check: Check, table: EventTable | None) -> dict[str, Any]:
+def _check(check: Check, table: EventTable | None) -> JsonObject:
     """One check."""
     return {
         "event": check.event.id,

@@ -7,7 +7,7 @@ import json
 import logging
 import re
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ..clock import Instant, later, rfc3339
 from ..clock import now as present
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..config import Config
     from ..hardware.mavlink.interface import MavlinkRobotHW
     from ..interface import HardwareInterface, IndustrialRobotStatusHandle
+    from ..json_object import JsonObject
     from ..links.log import Stamped
 
 log = logging.getLogger(__name__)
@@ -41,7 +42,7 @@ take 17 s."""
 PATIENCE: Final = 30.0  # s to wait for the first heartbeat
 
 
-def explain_log(config: Config, path: str, at: str | None) -> list[dict[str, Any]]:
+def explain_log(config: Config, path: str, at: str | None) -> list[JsonObject]:
     """The explanations at a time in a log, by default at its end.
 
     `at` is an RFC 3339 time, or `+44` for seconds after the first record. Raises UsageError if the log lacks it.
@@ -70,7 +71,7 @@ def _up_to(recording: Iterable[Stamped], at: str | None) -> Iterator[Stamped]:
         raise UsageError(f"--at {at}: the log ends at {rfc3339(last.unix_us)}")
 
 
-def explain_live(config: Config, stdout: TextIO, clock: Callable[[], Instant] = present) -> list[dict[str, Any]]:
+def explain_live(config: Config, stdout: TextIO, clock: Callable[[], Instant] = present) -> list[JsonObject]:
     """The explanations of the vehicles on live links, LISTEN seconds after the first heartbeat."""
     gateway = EventLoop(silent(config), stdout)
     gateway.stop_on_signals()
@@ -121,13 +122,13 @@ def moment(at: str, start_us: int) -> int:
     return round(time.timestamp() * 1e6)
 
 
-def explanations(hw: HardwareInterface, vehicles: MavlinkRobotHW, now: Instant) -> list[dict[str, Any]]:
+def explanations(hw: HardwareInterface, vehicles: MavlinkRobotHW, now: Instant) -> list[JsonObject]:
     """One explanation for each robot heard. An ArduPilot's has a member `applet`, a PX4's `arming_checks`."""
     heard = list(filter(_is_heard, hw.handles))
     for handle in heard:
         hw.explain(handle.name, now)
     reports = applet.reports(vehicles, now)
-    more: dict[str, dict[str, Any]] = {name: {"applet": report} for name, report in reports.items()}
+    more: dict[str, JsonObject] = {name: {"applet": report} for name, report in reports.items()}
     more |= {name: {"arming_checks": checks} for name, checks in arming_checks.reports(vehicles).items()}
     return [explanation(handle, now) | more.get(handle.name, {}) for handle in heard]
 
@@ -136,17 +137,17 @@ def _is_heard(handle: IndustrialRobotStatusHandle) -> bool:
     return handle.detail.link is not LinkState.NEVER_SEEN
 
 
-def as_json(found: Iterable[dict[str, Any]]) -> list[str]:
+def as_json(found: Iterable[JsonObject]) -> list[str]:
     """The explanations as lines of JSON, one object each."""
     return [json.dumps(one) for one in found]
 
 
-def as_table(found: Iterable[dict[str, Any]]) -> list[str]:
+def as_table(found: Iterable[JsonObject]) -> list[str]:
     """The explanations as tables for a person: their lines, with an empty one between two tables."""
     return [line for one in found for line in ("", *_table(one))][1:]
 
 
-def _table(one: dict[str, Any]) -> Iterator[str]:
+def _table(one: JsonObject) -> Iterator[str]:
     yield f"{_name(one)}, {one['link']['state']}, at {one['stamp']}"
     rows = [("field", "value", "age", "why")]
     for name, field in one["fields"].items():
@@ -164,7 +165,7 @@ def _table(one: dict[str, Any]) -> Iterator[str]:
         yield f"check    {_checked(check)}"
 
 
-def _causes(one: dict[str, Any]) -> Iterator[str]:
+def _causes(one: JsonObject) -> Iterator[str]:
     """The errors and inhibits, each with its next step. A step is named once."""
     named: set[str] = set()
     for kind, cause in (*(("error", e) for e in one["errors"]), *(("inhibit", i) for i in one["inhibits"])):
@@ -176,14 +177,14 @@ def _causes(one: dict[str, Any]) -> Iterator[str]:
         named.add(step)
 
 
-def _checked(check: dict[str, Any]) -> str:
+def _checked(check: JsonObject) -> str:
     """A failing arming check: its text, its component, its modes, and what can be done about it."""
     modes = "" if check["modes"] is None else f", modes: {', '.join(check['modes'])}"
     more = "" if check["description"] is None else f". {check['description']}"
     return f"{check['text']} since {check['since']}, component: {check['component']}{modes}{more}"
 
 
-def _name(one: dict[str, Any]) -> str:
+def _name(one: JsonObject) -> str:
     """`vehicle 1.1 (ARDUPILOTMEGA, GROUND_ROVER, AUTO)`; a robot without MAVLink and a group have their handle."""
     if "members" in one:
         return f"group {one['handle']} ({', '.join(one['members'])})"
@@ -195,12 +196,12 @@ def _name(one: dict[str, Any]) -> str:
     return f"{who} ({kind})"
 
 
-def _member(cause: dict[str, Any]) -> str:
+def _member(cause: JsonObject) -> str:
     """The member of a group that reports it."""
     return f"{cause['handle']}: " if "handle" in cause else ""
 
 
-def _report(report: dict[str, Any] | None) -> str:
+def _report(report: JsonObject | None) -> str:
     if report is None:
         return f"not heard: {applet.PAGE}"
     return f"RS_STOP {report['value']}, {applet.WORDS[report['value']]}, {report['age']:.1f} s ago"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 import threading
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ..clock import now as present
 from ..config import PublisherConfig
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..config import Config
     from ..interface import IndustrialRobotStatusInterface
+    from ..json_object import JsonMapping
     from ..mavlink.framing import Frame
     from ..publishers.board import Entry, Transition
 
@@ -41,7 +42,7 @@ PATIENCE: Final = 5.0  # s to wait for the gateway to end
 class Row(NamedTuple):
     """The present state of one vehicle."""
 
-    line: Mapping[str, Any]
+    line: JsonMapping
     """Its status: the members of a native JSON line."""
     stamp: str
     """The time of the status, RFC 3339."""
@@ -63,7 +64,7 @@ class BackgroundGateway(Observer):
         self.now = clock
         self.explained = ""
         """The handle to explain; empty: none."""
-        self._explanation: Mapping[str, Any] | None = None
+        self._explanation: JsonMapping | None = None
         self._explain_at = 0.0
         self._rates: dict[tuple[int, int], Rates] = {}
         self._error: BaseException | None = None
@@ -92,7 +93,7 @@ class BackgroundGateway(Observer):
         """Wait for the end of the gateway, at most `seconds`. True if it has ended."""
         return self._ended.wait(seconds)
 
-    def explanation(self) -> Mapping[str, Any] | None:
+    def explanation(self) -> JsonMapping | None:
         """The latest explanation of the handle in `explained`, as `explain --as-json` prints it."""
         return self._explanation
 

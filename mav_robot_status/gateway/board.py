@@ -7,7 +7,7 @@ import math
 import secrets
 import signal
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ..clock import now as present
 from ..publishers.board import Board
@@ -23,11 +23,12 @@ if TYPE_CHECKING:
     from paho.mqtt.client import MQTTMessage
 
     from ..clock import Instant
+    from ..json_object import JsonMapping
     from ..publishers.mqtt.settings import Broker
     from ..publishers.web.events import Events
     from ..publishers.web.settings import WebSettings
 
-    Line = tuple[Mapping[str, Any], Mapping[str, Any] | None]
+    Line = tuple[JsonMapping, JsonMapping | None]
     """A line, and the last one with a connected link."""
 
 log = logging.getLogger(__name__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from ..errors import MavRobotStatusError
 
@@ -30,7 +30,7 @@ class Guard:
         self.broken = False
         self._through = through
 
-    def call(self, default: T, function: Callable[..., T], *arguments: Any) -> T:
+    def call(self, default: T, function: Callable[..., T], *arguments: object) -> T:
         """The result of the function; `default` after the first exception."""
         if self.broken:
             return default

@@ -6,7 +6,7 @@ import itertools
 import logging
 from contextlib import ExitStack
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..config import Config
 from ..hardware.mavlink.message_table import COMMAND_IDS
@@ -409,12 +409,12 @@ class LinkHub:
         requests, self._requests = self._requests, set()
         return requests
 
-    def send(self, message: Any, system: int, audience: Audience) -> None:
+    def send(self, message: NamedTuple, system: int, audience: Audience) -> None:
         """`MavlinkPort`: send a message about the vehicle with this system id."""
         channel: Any = audience.key
         self.sender.send_unasked(channel, message, system)
 
-    def send_to(self, channel: Any, message: Any, system: int) -> None:
+    def send_to(self, channel: Any, message: NamedTuple, system: int) -> None:
         """Send one message on one channel, with our ids for this system."""
         self.sender.send(channel, message, system)
 

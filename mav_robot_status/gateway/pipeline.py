@@ -10,7 +10,7 @@ import math
 from contextlib import ExitStack, contextmanager
 from itertools import count
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final, TextIO
+from typing import TYPE_CHECKING, Final, TextIO
 
 from ..clock import Instant
 from ..controller import IndustrialRobotStatusController
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from ..config import Config, ControllerConfig, PublisherConfig
     from ..interface import HardwareInterface, IndustrialRobotStatusHandle, MavlinkPort, Metrics, Publisher
+    from ..json_object import JsonObject
     from .observer import Observer
 
 IN_ORDER: Final = attrgetter("number")
@@ -118,7 +119,7 @@ class Pipeline:
         self.hw = renewed()
         self._configure(config)
 
-    def explain(self, handle: str, now: Instant) -> dict[str, Any] | None:
+    def explain(self, handle: str, now: Instant) -> JsonObject | None:
         """Why each field of a handle has its value. None for an unknown handle, and for a robot never heard."""
         if handle not in self.hw.handles.get_names():
             return None

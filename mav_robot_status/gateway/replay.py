@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import later
 from ..interface import LinkState
@@ -40,7 +40,7 @@ class NoMavlinkPort:
         """No requests."""
         return ()
 
-    def send(self, message: Any, system: int, audience: Audience) -> None:
+    def send(self, message: NamedTuple, system: int, audience: Audience) -> None:
         """Send nothing."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..interface import LinkState, TriState
 from ..links.record import TlogWriter
@@ -61,7 +61,7 @@ class Sender:
         if self.recorder is not None:
             log.info("%s", self.recorder.text)
 
-    def send(self, channel: Channel, message: Any, system: int) -> int:
+    def send(self, channel: Channel, message: NamedTuple, system: int) -> int:
         """Send one message on one channel, with our ids for this system. Returns its size in bytes."""
         return self._send_frame(channel, self.component.frame(message, system, channel.encoders))
 
@@ -71,7 +71,7 @@ class Sender:
             return 0
         return self._send_frame(channel, self.component.heartbeat(system, in_error, channel.encoders))
 
-    def send_unasked(self, channel: Channel, message: Any, system: int) -> None:
+    def send_unasked(self, channel: Channel, message: NamedTuple, system: int) -> None:
         """Send a message within the allowance of the link, or later."""
         speech = channel.endpoint.speech
         if channel.interval is not None:  # the peer has asked for it

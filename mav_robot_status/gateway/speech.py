@@ -6,14 +6,16 @@ keeps its place in the queue. So no vehicle starves, and nothing waits that is o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from mav_robot_status.values import NamedTuple
+from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from .endpoint import Channel
+
+T = TypeVar("T")
 
 LIMIT: Final = 1000.0
 """Bytes a second on a link to vehicles: a telemetry radio carries 5700."""
@@ -60,7 +62,7 @@ class Speech:
         """Whether more than so many bytes may be sent in this second."""
         return self._left > size
 
-    def in_turn(self, things: Sequence[Any], say: Callable[[Any], int]) -> None:
+    def in_turn(self, things: Sequence[T], say: Callable[[T], int]) -> None:
         """Send something about each of these things, in turn over several seconds if the allowance is too small.
 
         `say` sends, and returns the number of bytes.

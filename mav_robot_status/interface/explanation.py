@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..clock import rfc3339
 from .fields import STATES
 
 if TYPE_CHECKING:
     from ..clock import Instant
+    from ..json_object import JsonObject
     from .fields import Field
     from .handle import IndustrialRobotStatusHandle
 
 
-def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> dict[str, Any]:
+def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> JsonObject:
     """The status in a handle with its evidence. Ages are in seconds at `now`; UNKNOWN is None.
 
     `members` is that of a JSON line: only a group has it.
@@ -38,7 +39,7 @@ def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> dict[str, 
     }
 
 
-def _field(handle: IndustrialRobotStatusHandle, field: Field, now: float) -> dict[str, Any]:
+def _field(handle: IndustrialRobotStatusHandle, field: Field, now: float) -> JsonObject:
     evidence = handle.evidence.get(field.name)
     return {
         "value": field.plain(getattr(handle.status, field.name)),

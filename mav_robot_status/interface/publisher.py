@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol, TextIO
+from typing import TYPE_CHECKING, Protocol, TextIO
 
 from ..values import NamedTuple
 
@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Container, Hashable, Mapping, Sequence
 
     from ..clock import Instant
+    from ..json_object import JsonMapping
     from .metrics import Metrics
     from .status import RobotStatusMsg
 
@@ -79,7 +80,7 @@ class MavlinkPort(Protocol):
     def requests(self) -> Collection[tuple[Hashable, int]]:
         """Requests for one ROBOT_STATUS since the last call: key of the audience, system id of the vehicle."""
 
-    def send(self, message: Any, system: int, audience: Audience) -> None:
+    def send(self, message: NamedTuple, system: int, audience: Audience) -> None:
         """Send a message of `mavlink.definitions` about the vehicle with this system id."""
 
 
@@ -92,7 +93,7 @@ class PublisherContext(NamedTuple):
     stdout: TextIO
     patient: bool = False
     """True on replay: the log waits for a slow reader, and no message is lost."""
-    explain: Callable[[str, Instant], Mapping[str, Any] | None] | None = None
+    explain: Callable[[str, Instant], JsonMapping | None] | None = None
     """The evidence for each field of a handle, as `explain --as-json` prints it; None for an unknown handle or a
     vehicle that was not heard. Only the gateway's thread may call it. It takes 0.1 ms."""
     metrics: Callable[[Instant], Metrics] | None = None

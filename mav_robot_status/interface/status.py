@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any, Final
+from typing import Final
 
 from ..clock import rfc3339
+from ..json_object import JsonObject
 from ..values import NamedTuple
 from .fields import RobotMode, RobotStatus, TriState
 
@@ -98,7 +99,7 @@ class Vehicle(NamedTuple):
     name: str | None = None
     """What people call the robot: 1 to 40 printable characters. The configuration gives it."""
 
-    def members(self) -> dict[str, Any]:
+    def members(self) -> JsonObject:
         """The members in JSON. Those that were added later are absent while they are None."""
         return {name: value for name, value in self._asdict().items() if value is not None or name not in _ADDED}
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
-from typing import Any, Final
+from typing import Final
 
+from ..json_object import JsonMapping
 from ..values import NamedTuple
 from .remedies import Remedy, remedy
 from .values import UNKNOWN, Look, Tone, look
 
-Line = Mapping[str, Any]
+Line = JsonMapping
 """The members of a JSON line."""
 
 
@@ -194,7 +195,7 @@ def _why(line: Line, state: str) -> tuple[Sentence, ...]:
     )
 
 
-def _quoted(cause: Mapping[str, Any]) -> Sentence:
+def _quoted(cause: JsonMapping) -> Sentence:
     text, member = cause.get("text"), _member(cause)
     said = remedy(cause).sentence
     return (
@@ -204,17 +205,17 @@ def _quoted(cause: Mapping[str, Any]) -> Sentence:
     )
 
 
-def _sentence(error: Mapping[str, Any]) -> Sentence:
+def _sentence(error: JsonMapping) -> Sentence:
     """An error, with the words of the autopilot."""
     text = error.get("text")
     return Sentence(f"Error: {_member(error)}{remedy(error).sentence}", None, str(text) if text else None)
 
 
-def _is_stop(cause: Mapping[str, Any]) -> bool:
+def _is_stop(cause: JsonMapping) -> bool:
     return cause.get("name") == "E_STOPPED" and bool(cause.get("handle"))
 
 
-def _member(cause: Mapping[str, Any]) -> str:
+def _member(cause: JsonMapping) -> str:
     """The member of a group that reports a cause, for the front of a sentence."""
     return f"{cause['handle']}: " if cause.get("handle") else ""
 
@@ -229,22 +230,22 @@ def _charge(line: Line, state: str) -> tuple[Sentence, ...]:
     return (Sentence(who.get(str(line.get("mode")), "Who commands it is unknown") + mode),)
 
 
-def _part(line: Line, name: str) -> Mapping[str, Any]:
+def _part(line: Line, name: str) -> JsonMapping:
     found = line.get(name)
     return found if isinstance(found, Mapping) else {}
 
 
-def _list(line: Line, name: str) -> list[Mapping[str, Any]]:
+def _list(line: Line, name: str) -> list[JsonMapping]:
     found = line.get(name)
     return [one for one in found if isinstance(one, Mapping)] if isinstance(found, list) else []
 
 
-def _inhibits(line: Line) -> list[Mapping[str, Any]]:
+def _inhibits(line: Line) -> list[JsonMapping]:
     """The inhibits, those with words of the autopilot last. A lost link is left out: it gives no reason."""
     found = (one for one in _list(line, "inhibits") if one.get("name") != UNHEARD)
     return sorted(found, key=lambda one: bool(one.get("text")))
 
 
-def _unheard_members(line: Line) -> list[Mapping[str, Any]]:
+def _unheard_members(line: Line) -> list[JsonMapping]:
     """The inhibits that say which members of a group are not heard."""
     return [one for one in _list(line, "inhibits") if one.get("name") == UNHEARD]

@@ -5,9 +5,9 @@ A step never says that something is safe, and never turns a check off. It holds 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
+from ..json_object import JsonMapping
 from ..values import NamedTuple
 from .texts import step_for
 
@@ -250,7 +250,7 @@ WORDS_DECIDE: Final = WHILE_ARMED | {"PREARM_FAILING", "CONFIGURATION"}
 """The names that say nothing by themselves: the step depends on the autopilot's words."""
 
 
-def remedy(cause: Mapping[str, Any]) -> Remedy:
+def remedy(cause: JsonMapping) -> Remedy:
     """The row for an error or inhibit of a JSON line. A name without a row is spoken as it is."""
     name, text = str(cause.get("name", "")), cause.get("text")
     row = REMEDIES.get(name) or (SENSOR if name.startswith("SENSOR_") else Remedy(spoken(name)))

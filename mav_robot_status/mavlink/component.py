@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from .definitions import Heartbeat
 from .encode import Encoder
@@ -63,7 +63,7 @@ class Component:
         """Whether we have sent with these ids."""
         return component == self.id and system in self._systems
 
-    def frame(self, message: Any, vehicle: int, encoders: dict[int, Encoder] | None = None) -> bytes:
+    def frame(self, message: NamedTuple, vehicle: int, encoders: dict[int, Encoder] | None = None) -> bytes:
         """The next frame with `message` about the vehicle with this system id.
 
         `encoders` belong to the channel of the receiver, because each channel counts its own frames; None: there is

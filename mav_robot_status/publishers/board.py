@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ..clock import rfc3339
 from ..interface import STATES
@@ -18,10 +18,11 @@ from ..values import NamedTuple
 from .json_lines import native_body
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from ..clock import Instant
     from ..interface import PublisherContext, RobotStatusMsg
+    from ..json_object import JsonMapping, JsonObject
 
 MOST_HANDLES: Final = 4096
 MOST_MEMBERS: Final = 256
@@ -44,9 +45,9 @@ class Transition(NamedTuple):
     """The time of the status, RFC 3339."""
     name: str
     """A field, `flight_mode`, `link`, `error` or `inhibit`."""
-    value: Any
+    value: object
     """The new value; of an error or inhibit its name, text and whether it begins."""
-    before: Any = None
+    before: object = None
     """The previous value. None for UNKNOWN, before the first value, and for an error or inhibit."""
 
 
@@ -60,9 +61,9 @@ class Entry:
         """When (monotonic seconds) the first line arrived."""
         self.lines = 0
         """The number of lines so far."""
-        self.line: Mapping[str, Any] = {}
+        self.line: JsonMapping = {}
         """The members of its last native line with a change. `stamp` and `heartbeat_age` are kept separately."""
-        self.last: Mapping[str, Any] | None = None
+        self.last: JsonMapping | None = None
         """The last whole line with a connected link, once the link is lost; None before."""
         self.stamp = ""
         self.heartbeat_age: float | None = None
@@ -72,7 +73,7 @@ class Entry:
         """The version of the board at the last change of this entry."""
         self.transitions: deque[Transition] = deque(maxlen=MOST_TRANSITIONS)
 
-    def whole(self) -> dict[str, Any]:
+    def whole(self) -> JsonObject:
         """The whole line, as `--format native` writes it. `seq` counts the lines so far."""
         link = {**self.line.get("link", {}), "heartbeat_age": self.heartbeat_age}
         return {"stamp": self.stamp, "seq": self.lines - 1, **self.line, "link": link}
@@ -87,7 +88,7 @@ class Board:
         """Counts the changes of all entries."""
         self.refused = 0
         """Lines of handles beyond MOST_HANDLES."""
-        self._seen: dict[str, tuple[Any, Any]] = {}
+        self._seen: dict[str, tuple[object, object]] = {}
 
     def __iter__(self) -> Iterator[Entry]:
         """The groups, each with its members after it; then the other entries by system, component and handle.
@@ -112,9 +113,7 @@ class Board:
         entry.stamp, entry.at = stamp, now
         entry.heartbeat_age = None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
 
-    def update_line(
-        self, handle: str, line: Mapping[str, Any], now: float, last: Mapping[str, Any] | None = None
-    ) -> None:
+    def update_line(self, handle: str, line: JsonMapping, now: float, last: JsonMapping | None = None) -> None:
         """Update the board with a parsed line of another process. `handle` replaces the handle in the line.
 
         `last` is the last line with a connected link, if the board may not have seen it.
@@ -159,7 +158,7 @@ class Board:
         entry.lines += 1
         return entry
 
-    def _change(self, entry: Entry, line: Mapping[str, Any], stamp: str, now: float) -> None:
+    def _change(self, entry: Entry, line: JsonMapping, stamp: str, now: float) -> None:
         transitions = entry.transitions
         known = entry.line
         if not _is_connected(known):
@@ -221,7 +220,7 @@ def _order(entry: Entry) -> tuple[bool, int, int, str]:
     return not known, system if isinstance(system, int) else 0, number, str(entry.line.get("handle", ""))
 
 
-def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+def _changes(before: JsonMapping, after: JsonMapping) -> Iterator[tuple[str, object, object]]:
     for name in (field.name for field in STATES):
         if before.get(name, before) != after.get(name):
             yield name, after.get(name), before.get(name)
@@ -231,7 +230,7 @@ def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tu
             yield group if group == "link" else name, value, old_value
 
 
-def _cause_changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[tuple[str, Any, None]]:
+def _cause_changes(before: JsonMapping, after: JsonMapping) -> Iterator[tuple[str, object, None]]:
     """Errors and inhibits that begin or end since `before`, the last line with a connected link.
 
     Nobody knows whether a cause ends while its robot, or its member of a group, is not heard.
@@ -249,21 +248,21 @@ def _cause_changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Itera
                 yield one, {**new[cause], "begins": True}, None
 
 
-def _is_connected(line: Mapping[str, Any]) -> bool:
+def _is_connected(line: JsonMapping) -> bool:
     return bool(_member(line, "link", "state") == "CONNECTED")
 
 
-def _member(line: Mapping[str, Any], group: str, name: str) -> Any:
+def _member(line: JsonMapping, group: str, name: str) -> object:
     members = line.get(group)
     return members.get(name) if isinstance(members, dict) else None
 
 
-def _causes(line: Mapping[str, Any], group: str) -> dict[tuple[str, str], dict[str, Any]]:
+def _causes(line: JsonMapping, group: str) -> dict[tuple[str, str], JsonObject]:
     """The causes by name and, in a group, by the member that reports them."""
     causes = line.get(group)
     if not isinstance(causes, list):
         return {}
-    found: dict[tuple[str, str], dict[str, Any]] = {}
+    found: dict[tuple[str, str], JsonObject] = {}
     for cause in causes:  # if several have the same name, the text of the first is shown
         if isinstance(cause, dict):
             member = {"handle": cause["handle"]} if "handle" in cause else {}

@@ -151,7 +151,7 @@ def exposition(metrics: Metrics) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def _lines(families: Iterable[Family], things: list[tuple[Labels, Any]]) -> Iterator[str]:
+def _lines(families: Iterable[Family], things: list[tuple[Labels, object]]) -> Iterator[str]:
     for family in families:
         yield from _family(family, things)
 
@@ -170,7 +170,7 @@ def _of_publisher(one: PublisherMetrics) -> Labels:
     return {"publisher": one.type, "number": one.number}
 
 
-def _family(family: Family, things: list[tuple[Labels, Any]]) -> list[str]:
+def _family(family: Family, things: list[tuple[Labels, object]]) -> list[str]:
     """The lines of a metric; none without a value. Values with the same labels are added: a series must be unique."""
     values: dict[str, float] = {}
     for labels, thing in things:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import json
 import lzma
 from collections.abc import Mapping
-from typing import Any
 
+from ..json_object import JsonMapping, JsonObject
 from ..mavlink.ftp.metadata import EVENTS, crc32
 from ..values import NamedTuple
 from .firmware import px4_mode
@@ -34,7 +34,7 @@ def event_id(name: str) -> int:
     return number & 0xFFFFFF
 
 
-def _events(*events: dict[str, Any]) -> dict[str, Any]:
+def _events(*events: JsonObject) -> JsonObject:
     return {"events": {str(event_id(event["name"])): event for event in events}}
 
 
@@ -42,18 +42,18 @@ def _arguments(*types: str) -> list[dict[str, str]]:
     return [{"name": f"argument{number}", "type": kind} for number, kind in enumerate(types)]
 
 
-def _check(name: str, message: str, description: str) -> dict[str, Any]:
+def _check(name: str, message: str, description: str) -> JsonObject:
     arguments = _arguments("navigation_mode_group_t", "uint8_t")
     return {"name": name, "message": message, "description": description, "arguments": arguments}
 
 
-def _enum(kind: str, *names: str, bits: bool = False) -> dict[str, Any]:
+def _enum(kind: str, *names: str, bits: bool = False) -> JsonObject:
     entries = {str(1 << n if bits else n): {"name": name, "description": name} for n, name in enumerate(names)}
     return {"type": kind, "is_bitfield": bits, "entries": entries}
 
 
 _MASK = "navigation_mode_group_t"
-TABLE: dict[str, Any] = {
+TABLE: JsonObject = {
     "version": 1,
     "components": {
         "1": {
@@ -108,7 +108,7 @@ TABLE: dict[str, Any] = {
 
 
 def event_files(
-    table: Mapping[str, Any] | bytes = TABLE, address: str = f"mftp://{PATH}", uri: str = f"mftp://{GENERAL}"
+    table: JsonMapping | bytes = TABLE, address: str = f"mftp://{PATH}", uri: str = f"mftp://{GENERAL}"
 ) -> VehicleFiles:
     """The files of a vehicle with this table, or with any bytes as its file.
 

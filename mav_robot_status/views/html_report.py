@@ -14,7 +14,7 @@ import os
 from collections import defaultdict
 from importlib.resources import files
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ..clock import rfc3339
 from ..errors import LinkError, UsageError
@@ -27,6 +27,7 @@ from .totals import totals
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from ..json_object import JsonObject
     from .timeline import Reason, Timeline, VehicleTimeline
     from .totals import ReasonTotal, Totals
 
@@ -55,7 +56,7 @@ def as_json(timelines: Iterable[Timeline]) -> str:
     return "\n".join(json.dumps(_vehicle(timeline, v)) for timeline in timelines for v in timeline.vehicles)
 
 
-def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> dict[str, Any]:
+def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> JsonObject:
     whole = totals(vehicle)
     return {
         "log": timeline.name,
@@ -92,7 +93,7 @@ def _lasted(track: str, values: dict[str, int]) -> dict[str, float]:
     return {value: _seconds(lasted) for value, lasted in every.items() if value}
 
 
-def _interval(timeline: Timeline, start: int, end: int) -> dict[str, Any]:
+def _interval(timeline: Timeline, start: int, end: int) -> JsonObject:
     return {
         "start": rfc3339(timeline.unix_us(start, start)),
         "end": rfc3339(timeline.unix_us(start, end)),
@@ -100,12 +101,12 @@ def _interval(timeline: Timeline, start: int, end: int) -> dict[str, Any]:
     }
 
 
-def _span(timeline: Timeline, track: str, span: Span) -> dict[str, Any]:
+def _span(timeline: Timeline, track: str, span: Span) -> JsonObject:
     value: str | bool | None = WORDS[span.value] if VALUES[track] == tuple(WORDS) else span.value or None
     return {"value": value, **_interval(timeline, span.start, span.end), "rule": span.rule, "source": span.source}
 
 
-def _reason(timeline: Timeline, reason: Reason) -> dict[str, Any]:
+def _reason(timeline: Timeline, reason: Reason) -> JsonObject:
     interval = _interval(timeline, reason.start, reason.end)
     return {"name": reason.name, "text": reason.text, **_member(reason), **interval}
 
@@ -115,7 +116,7 @@ def _member(reason: Reason | ReasonTotal) -> dict[str, str]:
     return {} if reason.handle is None else {"handle": reason.handle}
 
 
-def _reason_total(total: ReasonTotal, code: bool = True) -> dict[str, Any]:
+def _reason_total(total: ReasonTotal, code: bool = True) -> JsonObject:
     named = {"code": total.code} if code else {}
     return {
         **named,
@@ -181,18 +182,18 @@ def save(page: str, path: str) -> None:
         raise LinkError(f"cannot write the report {path!r}: {reason}") from None
 
 
-def embedded(data: Any) -> str:
+def embedded(data: object) -> str:
     """JSON for a script element."""
     return json.dumps(data, separators=(",", ":")).translate(ESCAPES)
 
 
-def _page_log(timeline: Timeline) -> dict[str, Any]:
+def _page_log(timeline: Timeline) -> JsonObject:
     strings = _Numbered()
     vehicles = [_page_vehicle(vehicle, strings) for vehicle in timeline.vehicles]
     return {"name": timeline.name, "segments": timeline.segments, "vehicles": vehicles, "strings": list(strings)}
 
 
-def _page_vehicle(vehicle: VehicleTimeline, strings: _Numbered) -> dict[str, Any]:
+def _page_vehicle(vehicle: VehicleTimeline, strings: _Numbered) -> JsonObject:
     by_name: dict[str, dict[str, Sequence[Reason]]] = {"errors": {}, "inhibits": {}}
     for kind, found in by_name.items():
         for title, reasons in _by_title(getattr(vehicle, kind)).items():
@@ -250,15 +251,15 @@ def _packed(spans: Sequence[Span | Reason], strings: _Numbered) -> list[int]:
     return packed
 
 
-class _Numbered(dict[Any, int]):
+class _Numbered(dict[object, int]):
     """Numbers texts, so that a repeated text is stored once."""
 
-    def __missing__(self, text: Any) -> int:
+    def __missing__(self, text: object) -> int:
         self[text] = len(self)
         return self[text]
 
 
-def _lists(whole: Totals) -> dict[str, list[dict[str, Any]]]:
+def _lists(whole: Totals) -> dict[str, list[JsonObject]]:
     """The lists among the totals."""
     return {
         "arm_cycles": [cycle._asdict() for cycle in whole.arm_cycles],
@@ -267,14 +268,14 @@ def _lists(whole: Totals) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def _total(total: ReasonTotal) -> dict[str, Any]:
+def _total(total: ReasonTotal) -> JsonObject:
     """A reason with its words, and the steps for its texts."""
     rows = [remedy({"name": total.name, "text": text}) for text in total.texts or (None,)]
     steps = list(dict.fromkeys(row.step for row in rows if row.step))
     return {**total._asdict(), "name": total.title, "sentence": rows[0].sentence, "steps": steps}
 
 
-def _inhibit(total: ReasonTotal) -> dict[str, Any]:
+def _inhibit(total: ReasonTotal) -> JsonObject:
     if total.name in UNCERTAIN:
         return {**_total(total), "kind": "unknown", "tone": "unknown"}
     tone = "warning" if remedy({"name": total.name}).person else "calm"

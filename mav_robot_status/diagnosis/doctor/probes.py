@@ -11,7 +11,7 @@ import socket
 import struct
 import time
 from contextlib import ExitStack, suppress
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...errors import LinkError
 from ...links.guarded import open_guarded
@@ -25,6 +25,7 @@ from .findings import Place
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from ...json_object import JsonObject
     from ...links.base import Link
     from ...links.url import Url
 
@@ -173,7 +174,7 @@ def holder(device: str) -> str:
 
 def serial_devices(folder: str = "/dev") -> tuple[str, ...]:
     """The serial devices of this computer, without duplicates."""
-    found: dict[str, Any] = {}
+    found: JsonObject = {}
     for pattern in DEVICES:
         for path in sorted(glob.glob(os.path.join(folder, pattern))):
             found.setdefault(os.path.realpath(path), path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ...clock import rfc3339
 from ...hardware.mavlink.identity import named
@@ -17,6 +17,7 @@ from .heard import duration
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from ...json_object import JsonObject
     from .diagnosis import Diagnosis
     from .findings import Findings, Speaker
     from .heard import Heard
@@ -129,7 +130,7 @@ def _by_id(counts: Mapping[int, int]) -> dict[str, int]:
     return {"other" if i == OTHER_IDS else str(i): n for i, n in sorted(counts.items())}
 
 
-def _speaker(s: Speaker) -> dict[str, Any]:
+def _speaker(s: Speaker) -> JsonObject:
     return {
         "system": s.system,
         "component": s.component,
@@ -151,7 +152,7 @@ def _speaker(s: Speaker) -> dict[str, Any]:
     }
 
 
-def _heard(heard: Heard) -> dict[str, Any]:
+def _heard(heard: Heard) -> JsonObject:
     last = heard.last
     return {
         "seconds": round(heard.seconds, 3),

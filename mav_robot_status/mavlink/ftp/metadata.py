@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 import zlib
-from typing import Any, Final
+from typing import Final
 
 from mav_robot_status.values import NamedTuple
 
@@ -72,7 +72,7 @@ def table_place(general: bytes) -> Place | Failure:
     return next(on_vehicle, places[0] if places else Failure("the table of its events has no address"))
 
 
-def _number(value: Any) -> int | None:
+def _number(value: object) -> int | None:
     return value if isinstance(value, int) and 0 < value <= 0xFFFFFFFF else None
 
 

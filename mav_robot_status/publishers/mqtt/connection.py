@@ -155,20 +155,20 @@ class Connection:
         client.on_message = lambda c, u, message: self._owner.received(message)
         return client
 
-    def _on_connect(self, client: Client, data: Any, flags: Any, code: ReasonCode, properties: Any) -> None:
+    def _on_connect(self, client: Client, data: object, flags: object, code: ReasonCode, properties: object) -> None:
         if code.is_failure:
             self._reason = f"the broker refuses: {words(code)}"
         else:
             self.open = True
 
-    def _on_disconnect(self, client: Client, data: Any, flags: Any, code: ReasonCode, properties: Any) -> None:
+    def _on_disconnect(self, client: Client, data: object, flags: Any, code: ReasonCode, properties: object) -> None:
         if flags.is_disconnect_packet_from_server:
             self._reason = f"the broker ends the connection: {words(code)}"
 
     def _on_subscribe(self, mid: int, codes: list[ReasonCode]) -> None:
         self._owner.acknowledged(mid, next(filter(None, map(refusal, codes)), None))
 
-    def _run(self, step: Callable[[], Any], now: float) -> bool:
+    def _run(self, step: Callable[[], object], now: float) -> bool:
         """Run a step of paho. False if the connection has ended."""
         was_open = self.open
         try:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...clock import rfc3339
 from .lines import unknown
@@ -17,6 +17,7 @@ from .robot import BROKEN, OFFLINE, ONLINE
 
 if TYPE_CHECKING:
     from ...clock import Instant
+    from ...json_object import JsonObject
 
 MOST_ROBOTS: Final = 4096
 LONGEST: Final = 65_536  # bytes of a status or an event
@@ -36,10 +37,10 @@ class _Robot:
     def __init__(self) -> None:
         self.state = ""
         """The state of its connection."""
-        self.line: dict[str, Any] = {}
-        self.last: dict[str, Any] | None = None
+        self.line: JsonObject = {}
+        self.last: JsonObject | None = None
         """The latest status with a connected link."""
-        self.mark: tuple[Any, Any] = (None, None)
+        self.mark: tuple[object, object] = (None, None)
         """Stamp and seq of the latest status."""
         self.at = -math.inf
         """When (monotonic seconds) that status arrived."""
@@ -56,7 +57,7 @@ class Fleet:
         self._start = f"{prefix}/"
         self._keepalive = keepalive
         self._robots: dict[str, _Robot] = {}
-        self._news: dict[str, dict[str, Any]] = {}
+        self._news: dict[str, JsonObject] = {}
         self.events = self.duplicates = self.missing = self.refused = 0
         """Events received, received twice, and skipped by a later one; messages that are not valid."""
 
@@ -81,12 +82,12 @@ class Fleet:
         elif what == "events" and not retained:
             self._event(name, payload)
 
-    def news(self) -> dict[str, dict[str, Any]]:
+    def news(self) -> dict[str, JsonObject]:
         """The lines that changed since the last call, by robot."""
         news, self._news = self._news, {}
         return news
 
-    def last(self, name: str) -> dict[str, Any] | None:
+    def last(self, name: str) -> JsonObject | None:
         """The latest status of a robot with a connected link, retained or not: its last known state."""
         robot = self._robots.get(name)
         return None if robot is None else robot.last
@@ -151,7 +152,7 @@ class Fleet:
         self._news[name] = {**line, "handle": name}
 
 
-def _parsed(payload: bytes) -> dict[str, Any] | None:
+def _parsed(payload: bytes) -> JsonObject | None:
     """A native line in which the members that readers rely on have the right types; None for anything else."""
     line = _object(payload)
     if line is None:
@@ -178,7 +179,7 @@ def _finite(text: str) -> float:
     return number
 
 
-def _object(payload: bytes) -> dict[str, Any] | None:
+def _object(payload: bytes) -> JsonObject | None:
     try:
         found = json.loads(payload, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError):

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...clock import rfc3339
 from ...interface import FIELDS, RobotStatus
 from ..json_lines import native, native_body
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from ...interface import RobotStatusMsg
+    from ...json_object import JsonMapping, JsonObject
 
-UNKNOWN: Final[dict[str, Any]] = {
+UNKNOWN: Final[JsonObject] = {
     **{field.name: field.plain(value) for field, value in zip(FIELDS, RobotStatus(), strict=True)},
     "errors": [],
 }
@@ -26,7 +25,7 @@ def line_of(msg: RobotStatusMsg, seq: int) -> str:
     return native(msg, seq, native_body(msg.handle, msg.status, msg.detail))[:-1]
 
 
-def unknown(line: Mapping[str, Any], stamp: str, why: str | None) -> dict[str, Any]:
+def unknown(line: JsonMapping, stamp: str, why: str | None) -> JsonObject:
     """The line of a robot without a live status: it has the robot's identity, and UNKNOWN for the rest."""
     seen = bool(line.get("stamp"))
     vehicle, members = line.get("vehicle"), line.get("members")
@@ -51,9 +50,7 @@ def unknown(line: Mapping[str, Any], stamp: str, why: str | None) -> dict[str, A
     }
 
 
-def event_of(
-    msg: RobotStatusMsg, old: Mapping[str, Any], new: Mapping[str, Any], robot: str, session: str, seq: int
-) -> dict[str, Any]:
+def event_of(msg: RobotStatusMsg, old: JsonMapping, new: JsonMapping, robot: str, session: str, seq: int) -> JsonObject:
     """One change: each changed member with its old and new value. The first event has every member, with null as its
     old value."""
     return {
@@ -73,7 +70,7 @@ def event_of(
     }
 
 
-def members_of(msg: RobotStatusMsg) -> dict[str, Any]:
+def members_of(msg: RobotStatusMsg) -> JsonObject:
     """The members that can change. Those of `vehicle` and `link` have names like `vehicle.flight_mode`."""
     line = json.loads("{" + native_body(msg.handle, msg.status, msg.detail) + "}}")
     groups = {"vehicle": msg.detail.vehicle._asdict(), "link": line.pop("link")}

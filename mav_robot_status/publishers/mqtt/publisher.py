@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import secrets
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...clock import now as present
 from ...errors import UsageError
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from ...clock import Instant
     from ...interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg
+    from ...json_object import JsonObject
     from .worker import Worker
 
 log = logging.getLogger(__name__)
@@ -35,7 +36,7 @@ class _Published:
     def __init__(self, robot: str) -> None:
         self.robot = robot
         self.content: tuple[RobotStatus, Detail] | None = None
-        self.members: dict[str, Any] = {}
+        self.members: JsonObject = {}
         """The members of `content`, as its last event has them."""
         self.seq = 0
         """The number of its last event."""

@@ -9,16 +9,17 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...clock import rfc3339
 from ...version import __version__
 from .said import said, with_words
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator
 
     from ...clock import Instant
+    from ...json_object import JsonMapping, JsonObject
     from ..board import Board, Entry
 
 PULSE: Final = 0.2
@@ -47,7 +48,7 @@ class Listener:
         """The last tick that it has."""
         self.sent_until: float | None = None
         """The end of the history that it has."""
-        self.explained: Mapping[str, Any] | None = None
+        self.explained: JsonMapping | None = None
 
 
 class Events:
@@ -64,7 +65,7 @@ class Events:
         """`standing` returns for how many seconds the board's source has been stalled; None while it runs."""
         self._board, self._clock, self._standing = board, clock, standing
         self._stale_after, self._alarm = stale_after, alarm
-        self._said: dict[str, tuple[int, dict[str, Any]]] = {}
+        self._said: dict[str, tuple[int, JsonObject]] = {}
         """What the page says of each handle, with the version of its entry. Made only while a browser needs it."""
         self._news = asyncio.Event()
         self._version, self._turn, self._ticked = -1, 0, 0.0
@@ -77,7 +78,7 @@ class Events:
         """Listeners that were disconnected."""
         self.watched: frozenset[str] = frozenset()
         """Handles that browsers show in detail. Other threads read this."""
-        self.explanations: dict[str, Mapping[str, Any]] = {}
+        self.explanations: dict[str, JsonMapping] = {}
 
     def enter(self, listener: Listener) -> bool:
         """Add a listener; False if there are MOST_LISTENERS already."""
@@ -92,7 +93,7 @@ class Events:
         self.listeners.discard(listener)
         self._update_watched()
 
-    def explain(self, handle: str, explanation: Mapping[str, Any]) -> None:
+    def explain(self, handle: str, explanation: JsonMapping) -> None:
         """The newest explanation of a handle; a new object each time."""
         if handle in self.watched:
             self.explanations[handle] = explanation
@@ -143,7 +144,7 @@ class Events:
 
     def _change(self, sent: int, turn: int) -> bytes:
         now = self._clock()
-        data: dict[str, Any] = {"now": rfc3339(now.unix_us), "standing": self._standing()}
+        data: JsonObject = {"now": rfc3339(now.unix_us), "standing": self._standing()}
         new = [entry for entry in self._board if entry.version > sent]
         data["vehicles"] = [entry.whole() for entry in new]
         data["headlines"] = {str(entry.line["handle"]): self._say(entry) for entry in new}
@@ -157,7 +158,7 @@ class Events:
             data.update(stale_after=self._stale_after, alarm=self._alarm)
         return event("board" if sent < 0 else "change", data)
 
-    def _say(self, entry: Entry) -> dict[str, Any]:
+    def _say(self, entry: Entry) -> JsonObject:
         handle = str(entry.line["handle"])
         version, words = self._said.get(handle, (-1, {}))
         if version != entry.version:

@@ -66,7 +66,7 @@ class Pages(Application):
             log_function=lambda handler: None,
         )
 
-    def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> Any:
+    def find_handler(self, request: HTTPServerRequest, **kwargs: object) -> Any:
         """The handler of a request. Each path has one spelling, for the routes and for the checks."""
         target = _TARGET.match(request.uri or "")
         request.path = quote(unquote(target[1])) if target else ""
@@ -101,7 +101,7 @@ class Handler(RequestHandler):
 
     head = get
 
-    def write_error(self, status_code: int, **_: Any) -> None:
+    def write_error(self, status_code: int, **_: object) -> None:
         """Send the text of an error. A body is not read after it, so the connection ends."""
         allow = {"Allow": "GET,HEAD"} if status_code == 405 else {}
         body = f"{status_code}: {self._reason}".encode()

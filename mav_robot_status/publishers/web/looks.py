@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...interface import STATES
 from ...language import LINK, LOOKS
@@ -11,6 +11,7 @@ from ...language.headline import LAST, MAY_MOVE, SINCE
 from ...language.values import UNKNOWN
 
 if TYPE_CHECKING:
+    from ...json_object import JsonObject
     from ...language import Look
 
 HEADS: Final = {
@@ -40,7 +41,7 @@ def fields_module() -> bytes:
     return "".join(f"export const {name} = {json.dumps(value)};\n" for name, value in parts.items()).encode()
 
 
-def _row(name: str, meaning: str) -> dict[str, Any]:
+def _row(name: str, meaning: str) -> JsonObject:
     words = name[0].upper() + name[1:].replace("_", " ")
     head, title = HEADS.get(name, (words, words))
     looks = [[value, _look(look)] for value, look in LOOKS[name].items()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...errors import UsageError
 from ..board import Board
@@ -12,10 +12,9 @@ from .options import HttpOptions
 from .settings import read
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from ...clock import Instant
     from ...interface import PublisherContext, RobotStatus, RobotStatusMsg
+    from ...json_object import JsonMapping
     from .events import Events
 
 MOST_WAITING: Final = 10_000
@@ -51,7 +50,7 @@ class HttpPublisher:
         self._waiting: list[RobotStatusMsg] = []
         self._gone: list[str] = []
         """Handles that the server has to remove."""
-        self._explanations: dict[str, Mapping[str, Any]] = {}
+        self._explanations: dict[str, JsonMapping] = {}
         self._explained: dict[str, float] = {}
         """When (monotonic seconds) each vehicle that a browser shows was explained."""
         self._statuses: dict[str, RobotStatus] = {}
@@ -127,7 +126,7 @@ class HttpPublisher:
 
 def _put(
     messages: list[RobotStatusMsg],
-    explanations: dict[str, Mapping[str, Any]],
+    explanations: dict[str, JsonMapping],
     gone: list[str],
     board: Board,
     events: Events,

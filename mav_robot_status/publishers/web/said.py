@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...interface import STATES
 from ...language import headline, remedy
 from ...language.headline import UNHEARD
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from ...json_object import JsonMapping, JsonObject
 
 MOST_SENTENCES: Final = 16
 MOST_CAUSES: Final = 64
 """Causes of one robot that the page lists."""
 
 
-def said(line: Mapping[str, Any], last: Mapping[str, Any] | None) -> dict[str, Any]:
+def said(line: JsonMapping, last: JsonMapping | None) -> JsonObject:
     """The members of `headlines` in an event. `last` is the last line with a connected link, if known."""
     found = headline(line, last)
     values = last or {}
@@ -34,12 +34,12 @@ def said(line: Mapping[str, Any], last: Mapping[str, Any] | None) -> dict[str, A
     }
 
 
-def with_words(value: Any) -> Any:
+def with_words(value: object) -> object:
     """The value of a transition; a cause has its words."""
     return {**value, "words": remedy(value).sentence} if isinstance(value, dict) else value
 
 
-def _causes(line: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+def _causes(line: JsonMapping) -> list[tuple[str, JsonMapping]]:
     """Each cause with its list: errors, inhibits, or `unheard` if it says only that nothing is known."""
     return [
         ("unheard" if cause.get("name") == UNHEARD else group, cause)
@@ -50,13 +50,13 @@ def _causes(line: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
     ]
 
 
-def _cause(group: str, cause: Mapping[str, Any]) -> dict[str, Any]:
+def _cause(group: str, cause: JsonMapping) -> JsonObject:
     found = remedy(cause)
     names = ("name", "code", "text", "since", "handle")
     kept = {name: cause[name] for name in names if cause.get(name) is not None}
     return {"list": group, "words": found.sentence, "step": found.step, "topic": found.topic, **kept}
 
 
-def _state(line: Mapping[str, Any]) -> object:
+def _state(line: JsonMapping) -> object:
     link = line.get("link")
     return link.get("state") if isinstance(link, dict) else None

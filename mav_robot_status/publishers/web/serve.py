@@ -10,7 +10,7 @@ import re
 import threading
 from hashlib import sha256
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from tornado.iostream import StreamClosedError
 
@@ -136,7 +136,7 @@ class WebServer:
         finally:
             self._connections.close()
 
-    def _failed(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    def _failed(self, loop: asyncio.AbstractEventLoop, context: dict[str, object]) -> None:
         """Log a failure of the event loop. The end of a connection is not one, nor is a request cut off at the end."""
         if not isinstance(context.get("exception"), (OSError, asyncio.CancelledError)):
             loop.default_exception_handler(context)

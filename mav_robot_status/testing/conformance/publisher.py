@@ -18,7 +18,7 @@ import math
 import os
 import threading
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from typing import Any, Final, TextIO
+from typing import Final, NamedTuple, TextIO
 
 import pytest
 
@@ -72,7 +72,7 @@ class RecordedPort:
     """A MAVLink port with one ground station. It stores the sent messages."""
 
     def __init__(self) -> None:
-        self.sent: list[tuple[Any, int]] = []
+        self.sent: list[tuple[NamedTuple, int]] = []
 
     def audiences(self) -> Sequence[Audience]:
         """One ground station."""
@@ -82,7 +82,7 @@ class RecordedPort:
         """No requests."""
         return ()
 
-    def send(self, message: Any, system: int, audience: Audience) -> None:
+    def send(self, message: NamedTuple, system: int, audience: Audience) -> None:
         """Store the message."""
         self.sent.append((message, system))
 

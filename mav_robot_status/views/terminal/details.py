@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...interface import STATES
 from ...language import LINK, LOOKS, TONES, look
@@ -11,6 +11,7 @@ from .columns import state
 from .text import Line, Signs, Span, clock, duration, fill, padded, toned
 
 if TYPE_CHECKING:
+    from ...json_object import JsonMapping
     from .robots import Change, Robot
 
 LABEL: Final = 10
@@ -45,7 +46,7 @@ def details(robot: Robot, signs: Signs) -> Iterator[Line]:
     yield _labelled("handle", signs.text(robot.handle))
 
 
-def evidence(explanation: Mapping[str, Any] | None, signs: Signs) -> Iterator[Line]:
+def evidence(explanation: JsonMapping | None, signs: Signs) -> Iterator[Line]:
     """Each field with its value, the age of the message that decided, the rule, and that message."""
     if explanation is None:
         yield (Span("Not heard: there is nothing to explain.", "dim"),)
@@ -90,11 +91,11 @@ def _change(change: Change, signs: Signs) -> Line:
     return now, Span("  was ", "dim"), Span(_word(name, change.before, signs).text, "dim")
 
 
-def _word(name: str, value: Any, signs: Signs) -> Span:
+def _word(name: str, value: object, signs: Signs) -> Span:
     return signs.of(look(name, value)) if name in LOOKS else Span(signs.text("none" if value is None else value))
 
 
-def _cause(cause: Mapping[str, Any], signs: Signs) -> str:
+def _cause(cause: JsonMapping, signs: Signs) -> str:
     text = f": “{cause['text']}”" if cause["text"] else ""
     member = f"{cause['handle']}: " if cause.get("handle") else ""
     return signs.text(f"{member}{cause['name']} since {clock(cause['since'])}{text}")

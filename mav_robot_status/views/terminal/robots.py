@@ -13,6 +13,7 @@ from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from ...clock import Instant
+    from ...json_object import JsonMapping
     from ...language import Headline, Look
 
 
@@ -20,7 +21,7 @@ class Row(Protocol):
     """One robot of a source."""
 
     @property
-    def line(self) -> Mapping[str, Any]:
+    def line(self) -> JsonMapping:
         """Its status: the members of a native JSON line."""
 
     @property
@@ -52,11 +53,11 @@ class Change(Protocol):
         """A field, `flight_mode`, `link`, `error` or `inhibit`."""
 
     @property
-    def value(self) -> Any:
+    def value(self) -> object:
         """The new value; of an error or inhibit its `name`, `text` and whether it `begins`."""
 
     @property
-    def before(self) -> Any:
+    def before(self) -> object:
         """The previous value; None also for UNKNOWN."""
 
 
@@ -86,7 +87,7 @@ class Source(Protocol):
     def changes(self, handles: Sequence[str], most: int) -> Sequence[tuple[str, Change]]:
         """The changes of these robots, each with its handle, the latest first."""
 
-    def explanation(self) -> Mapping[str, Any] | None:
+    def explanation(self) -> JsonMapping | None:
         """The latest explanation of the handle `explained`."""
 
 
@@ -100,7 +101,7 @@ class Robot(NamedTuple):
     """The handle of the group of which it is a member; empty: none."""
 
     @property
-    def line(self) -> Mapping[str, Any]:
+    def line(self) -> JsonMapping:
         """Its status."""
         return self.row.line
 
@@ -128,7 +129,7 @@ class Memory:
     """Makes robots of rows. It remembers what each was before its link was lost. Bounded by the rows of the source."""
 
     def __init__(self) -> None:
-        self._heard: dict[str, Mapping[str, Any]] = {}
+        self._heard: dict[str, JsonMapping] = {}
         self._headlines: dict[str, tuple[int, Headline]] = {}
 
     def robots(self, rows: Iterable[Row], now: Instant) -> list[Robot]:
@@ -151,7 +152,7 @@ class Memory:
         return row.version, headline(whole, self._heard.get(handle))
 
 
-def _name(line: Mapping[str, Any], is_member: bool) -> str:
+def _name(line: JsonMapping, is_member: bool) -> str:
     """What people call it, else `1.1`, else its handle. A member of a group has the handle by which the group names it.
 
     A default handle says nothing: its robot keeps its ids.

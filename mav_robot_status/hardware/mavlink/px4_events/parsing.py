@@ -7,11 +7,12 @@ Source of the format: mavlink/libevents, validation/schema.json.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from struct import Struct
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
+from ....json_object import JsonMapping
 from .ids import component_name
 from .table import ARGUMENT_BYTES, CODES, Definition, EventTable, Names
 from .template import compiled
@@ -108,24 +109,24 @@ def _no_constant(name: str) -> object:
     raise TableError(f"the table is not JSON: {name} is not a JSON number")
 
 
-def _mapping(value: object, what: str) -> Mapping[str, Any]:
+def _mapping(value: object, what: str) -> JsonMapping:
     if not isinstance(value, dict):
         raise TableError(f"{what} is not a mapping")
     return value
 
 
-def _list(value: object, what: str) -> list[Any]:
+def _list(value: object, what: str) -> list[object]:
     if not isinstance(value, list):
         raise TableError(f"{what} is not a list")
     return value
 
 
-def _entries(mapping: Mapping[str, Any], key: str) -> Iterator[tuple[str, Any]]:
+def _entries(mapping: JsonMapping, key: str) -> Iterator[tuple[str, object]]:
     """The entries of a mapping in a mapping; none if it is absent."""
     return iter(_mapping(mapping.get(key, {}), f"'{key}'").items())
 
 
-def _text(mapping: Mapping[str, Any], key: str, most: int = MOST_NAME) -> str:
+def _text(mapping: JsonMapping, key: str, most: int = MOST_NAME) -> str:
     """A text; empty if it is absent."""
     value = mapping.get(key, "")
     if not isinstance(value, str) or len(value) > most:
@@ -144,7 +145,7 @@ NamesOf = dict[tuple[str, str], tuple[str, Names]]
 """By name space and name: the type of an enumeration, and its words."""
 
 
-def _all_names(components: list[tuple[int, Mapping[str, Any]]]) -> NamesOf:
+def _all_names(components: list[tuple[int, JsonMapping]]) -> NamesOf:
     found: NamesOf = {}
     for _, component in components:
         space = _text(component, "namespace")
@@ -155,7 +156,7 @@ def _all_names(components: list[tuple[int, Mapping[str, Any]]]) -> NamesOf:
     return found
 
 
-def _names(enumeration: Mapping[str, Any]) -> tuple[str, Names]:
+def _names(enumeration: JsonMapping) -> tuple[str, Names]:
     kind = _text(enumeration, "type")
     if kind not in CODES or kind == "float":
         raise TableError(f"an enumeration has the type {kind[:20]!r}, which is not an integer")
@@ -168,13 +169,13 @@ def _names(enumeration: Mapping[str, Any]) -> tuple[str, Names]:
     return kind, Names(enumeration.get("is_bitfield") is True, MappingProxyType(entries))
 
 
-def _words(entry: Mapping[str, Any]) -> str:
+def _words(entry: JsonMapping) -> str:
     """The description of an entry, else its name, in one line."""
     words = " ".join(_text(entry, "description").split()) or " ".join(_text(entry, "name").split())
     return "".join(c for c in words if c.isprintable())
 
 
-def _all_events(components: list[tuple[int, Mapping[str, Any]]], names: NamesOf) -> dict[int, Definition]:
+def _all_events(components: list[tuple[int, JsonMapping]], names: NamesOf) -> dict[int, Definition]:
     found: dict[int, Definition] = {}
     for number, component in components:
         space = _text(component, "namespace")
@@ -188,7 +189,7 @@ def _all_events(components: list[tuple[int, Mapping[str, Any]]], names: NamesOf)
     return found
 
 
-def _definition(event: Mapping[str, Any], group: str, space: str, names: NamesOf) -> Definition:
+def _definition(event: JsonMapping, group: str, space: str, names: NamesOf) -> Definition:
     arguments = _list(event.get("arguments", []), "'arguments'")
     if len(arguments) > MOST_ARGUMENTS:
         raise TableError(f"an event has {len(arguments)} arguments, the limit is {MOST_ARGUMENTS}")
@@ -222,7 +223,7 @@ def _layout(codes: list[str]) -> Struct:
     return Struct("<" + "".join(codes))
 
 
-def _mode_groups(component: Mapping[str, Any]) -> Iterator[tuple[int, int]]:
+def _mode_groups(component: JsonMapping) -> Iterator[tuple[int, int]]:
     """Each custom_mode with the number of its group."""
     section = _mapping(component.get("navigation_mode_groups", {}), "'navigation_mode_groups'")
     for key, modes in _entries(section, "groups"):

@@ -6,7 +6,7 @@ Each field of `Facts` has its function here, in `SETTLE`. They are short, becaus
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ....interface.status import TriState
 from ....mavlink.enumerations import MAV_LANDED_STATE_UNDEFINED, MAV_STANDARD_MODE_NON_STANDARD
@@ -163,7 +163,7 @@ def text_overdue(state: VehicleState, moment: Moment, options: HardwareOptions) 
     return any(moment.has_come(partial.at + text_assembly.PATIENCE) for _, partial in state.texts)
 
 
-Settle = Callable[["VehicleState", "Moment", "HardwareOptions"], Any]
+Settle = Callable[["VehicleState", "Moment", "HardwareOptions"], object]
 
 SETTLE: Final[dict[str, Settle]] = {
     "kind": kind,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ....values import NamedTuple
 from ..armed import is_armed
@@ -23,7 +23,7 @@ class Rule(NamedTuple):
     """What one vehicle does not do: alternate between two values of `of`, in `runs` runs within `within` seconds."""
 
     what: str
-    of: Callable[[Heartbeat], Any]
+    of: Callable[[Heartbeat], object]
     runs: int
     within: float
     one_may: bool
@@ -46,7 +46,7 @@ class Turns:
     __slots__ = ("_runs",)
 
     def __init__(self) -> None:
-        self._runs: tuple[list[tuple[Any, float, bool]], ...] = tuple([] for _ in RULES)
+        self._runs: tuple[list[tuple[object, float, bool]], ...] = tuple([] for _ in RULES)
 
     def heard(self, heartbeat: Heartbeat, now: float, *, counted: bool = False) -> str | None:
         """Note a heartbeat that differs from the one before. Returns what alternates, if that shows two senders.

@@ -36,6 +36,7 @@ log = logging.getLogger(__name__)
 HAND_OVER: Final = 0.1  # s between two hand-overs to the web server
 EXPIRE: Final = 0.5  # s between two searches for expired robots
 MISSING_PERIOD: Final = 60.0  # s between two log lines about missing events
+PAUSE: Final = 2.0  # s between two looks after which what waits may be old
 SILENCE: Final = 5.0  # s without a message of any robot until a log line
 
 
@@ -52,7 +53,10 @@ class FleetBoard:
         self._connection = Connection(broker, ident, None, self, ErrorReporter("mqtt", broker.name))
         self._loop.add(self._connection)
         self._waiting: dict[str, Line] = {}
-        self._stop = False
+        self._stop = self._old = False
+        """Whether to stop; whether what arrives on this connection may be old."""
+        self._looked_at = math.inf
+        """When (monotonic seconds) messages were last read, or could have been."""
         self._missing_logged_at, self._missing_logged = -MISSING_PERIOD, 0
         self._subscribed = False
         self._silent_at = math.inf
@@ -73,6 +77,7 @@ class FleetBoard:
         expired_at = handed_at = 0.0
         try:
             while not self._stop:
+                self._looked_at = present().mono
                 self._loop.turn(HAND_OVER if self._waiting else EXPIRE)
                 now = present()
                 if now.mono - expired_at >= EXPIRE:
@@ -95,6 +100,7 @@ class FleetBoard:
 
     def opened(self) -> None:
         """Subscribe to all topics below the prefix."""
+        self._old = False
         self._fleet.begin()
         self._connection.subscribe(self._fleet.topics())
 
@@ -115,7 +121,15 @@ class FleetBoard:
     def received(self, message: MQTTMessage) -> None:
         """A message below the prefix, of a gateway or of another client."""
         self._silent_at = -math.inf
-        self._fleet.take(message.topic, bytes(message.payload), message.retain, present())
+        now = present()
+        if now.mono - self._looked_at > PAUSE and not self._old:
+            # this program was stopped: nobody knows how long what arrives now has waited
+            self._old = True
+            self._fleet.doubt(now)
+            self._connection.drop("this program was stopped, so what waits may be old")
+        self._looked_at = now.mono
+        if not self._old:
+            self._fleet.take(message.topic, bytes(message.payload), message.retain, now)
 
     def _hand_over(self) -> None:
         self._waiting.update((name, (line, self._fleet.last(name))) for name, line in self._fleet.news().items())

@@ -30,6 +30,8 @@ PAUSE: Final = 4.0
 """Length of the pause after a slow call, as a multiple of the call."""
 PERIOD: Final = 0.01
 """Least number of seconds between two turns that an interface causes, by input or by `next_due`."""
+LONGEST: Final = 3.0
+"""Seconds without a `read` after which the handles are unknown: nobody has looked whether the robots are heard."""
 MOST_AT_ONCE: Final = 64
 """Datagrams or pieces that one source reads at once."""
 
@@ -45,7 +47,7 @@ class GuardedHardware:
         self._unread = False
         """True if a source has received something since the last `read`."""
         self._read_at = self._paused_until = -math.inf
-        self._was_slow = self._lost = False
+        self._was_slow = self._lost = self._suspended = False
         self._why = "its hardware interface has failed"
         self._check = HandleCheck(name, stops_cut_power=bool(getattr(hardware, "stops_cut_power", True)))
         self._sources: list[GuardedSource] = []
@@ -82,6 +84,14 @@ class GuardedHardware:
             self._unread, self._read_at = False, self._clock()
             self.call(None, self._read, now)
         self._guard.call(None, self._check.check, self.handles, now)
+        is_late = self.paused and self._clock() - self._read_at > LONGEST
+        if is_late is not self._suspended and not self._guard.broken:
+            self._suspended = self.changed = is_late
+            if is_late:
+                self._guard.call(None, self._check.suspend, self.handles, "its hardware interface is too slow", now)
+            else:
+                self.changed = True
+                self._guard.call(None, self._check.resume, self.handles, now)
         if self._guard.broken and not self._lost:
             self._lost = self.changed = True
             self._check.lose(self.handles, self._why, now)
@@ -101,7 +111,7 @@ class GuardedHardware:
         if self._guard.broken:
             return math.inf if self._lost else -math.inf
         if self.paused:
-            return self._paused_until
+            return self._paused_until if self._suspended else min(self._paused_until, self._read_at + LONGEST + PERIOD)
         if self._unread:
             due = -math.inf
         else:

@@ -62,6 +62,22 @@ class HandleCheck:
             if last is None or not _are_same(held, last.shown):
                 self._check(handle, held if last is None else _given(held, last), now)
 
+    def suspend(self, handles: Iterable[IndustrialRobotStatusHandle], why: str, now: Instant) -> None:
+        """Make the handles UNKNOWN until `resume`."""
+        for handle in handles:
+            last = self._checked.get(handle.name)
+            if last is not None:
+                shown = _unknown(last.known, why, now)
+                self._checked[handle.name] = last._replace(shown=shown)
+                _put(handle, shown)
+
+    def resume(self, handles: Iterable[IndustrialRobotStatusHandle], now: Instant) -> None:
+        """Show again what the hardware interface puts into the handles."""
+        for handle in handles:
+            last = self._checked.get(handle.name)
+            if last is not None:
+                self._check(handle, _given(_values(handle), last), now)
+
     def lose(self, handles: Iterable[IndustrialRobotStatusHandle], why: str, now: Instant) -> None:
         """Make the handles UNKNOWN, as after the loss of a link."""
         for handle in handles:

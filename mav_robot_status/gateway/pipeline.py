@@ -16,7 +16,15 @@ from ..clock import Instant
 from ..controller import IndustrialRobotStatusController
 from ..due_times import DueTimes
 from ..errors import ConfigError, MavRobotStatusError
-from ..interface import InterfaceManager, LinkState, PublisherContext
+from ..interface import (
+    Detail,
+    Inhibit,
+    InterfaceManager,
+    LinkState,
+    PublisherContext,
+    RobotStatus,
+    RobotStatusMsg,
+)
 from ..interface.explanation import explanation
 from . import plugins
 from .controller_config import (
@@ -95,6 +103,8 @@ class Pipeline:
         self._idle: list[GuardedController] = []
         """The controllers that do not run."""
         self._due: DueTimes[GuardedController] = DueTimes()
+        self._served: set[tuple[tuple[str, str], str]] = set()
+        """The key of a publisher with the name of a handle that it gets."""
         self._seen: dict[str, IndustrialRobotStatusHandle] = {}
         """The handles that have their controllers."""
         self._version = -1
@@ -116,8 +126,25 @@ class Pipeline:
         kept = {publisher_key(p) for c in config.controllers or (DEFAULT_CONTROLLER,) for p in publishers_of(c)}
         for key in self.publishers.keys() - kept:  # first close, then open: a new publisher may use the same port
             self.publishers.pop(key).close()
+        before, handles = self._served, dict(self._seen)
         self.hw = renewed()
         self._configure(config)
+        for key, name in sorted(before - self._served):
+            publisher = self.publishers.get(key)
+            if publisher is not None:
+                self._release(publisher, handles[name], now)
+
+    @staticmethod
+    def _release(publisher: Publisher, handle: IndustrialRobotStatusHandle, now: Instant) -> None:
+        """Publish that nothing is known of a robot that this publisher gets no more of, and let it forget the robot."""
+        detail = handle.detail
+        if detail.link is not LinkState.NEVER_SEEN:
+            why = Inhibit("LINK_STALE", "the configuration no longer publishes it here", now.unix_us)
+            detail = Detail(detail.system, detail.component, (), (why,), link=LinkState.NEVER_SEEN)
+            publisher.publish(RobotStatusMsg(handle.name, now.unix_us, RobotStatus(), detail, None))
+            publisher.service(now)
+        forget: Callable[[str], None] = getattr(publisher, "forget", _keep)
+        forget(handle.name)
 
     def explain(self, handle: str, now: Instant) -> JsonObject | None:
         """Why each field of a handle has its value. None for an unknown handle, and for a robot never heard."""
@@ -255,6 +282,7 @@ class Pipeline:
         """Raises ConfigError if the controller cannot be made."""
         make = plugins.load(plugins.CONTROLLERS, config.type, config.where)
         served = [p for p in publishers_of(config) if self._single_handles.serves(p, config)]
+        self._served |= {(publisher_key(p), handle_name(config)) for p in served}
         publishers = self._publishers(served, config.where)
         with _as_config_error(f"{config.where}: controller '{config.name}'"):
             controller = make()

@@ -74,13 +74,11 @@ class Sender:
     def send_unasked(self, channel: Channel, message: NamedTuple, system: int) -> None:
         """Send a message within the allowance of the link, or later."""
         speech = channel.endpoint.speech
-        if channel.interval is not None:  # the peer has asked for it
-            if speech.has_room_for_asked:
-                speech.count_asked(self.send(channel, message, system))
-            else:
-                speech.withheld += 1
-            return
         key = channel, type(message), getattr(message, "subject_component", 0), getattr(message, "name", b""), system
+        if channel.interval is not None and speech.has_room_for_asked:  # the peer has asked for it
+            speech.forget(key)
+            speech.count_asked(self.send(channel, message, system))
+            return
         speech.wait(key, Waiting(channel, message, system))
         self._send_waiting(speech)
 

@@ -95,6 +95,11 @@ class Speech:
         if key in self._waiting or len(self._waiting) < MOST_WAITING:
             self._waiting[key] = waiting
 
+    def forget(self, key: object) -> None:
+        """Let a message with this key wait no longer: a newer one is sent at once."""
+        if self._waiting.pop(key, None) is not None:
+            self.withheld += 1
+
     def next_waiting(self) -> Waiting | None:
         """The message that has waited longest, if there is room for it. It no longer waits."""
         if not self._waiting or not self.has_room:

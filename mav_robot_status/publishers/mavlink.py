@@ -58,7 +58,7 @@ class MavlinkPublisher(RateLimitedPublisher[Schedule]):
             audiences = {audience.key: audience for audience in self._port.audiences()}
             for key, system in requests:
                 if key in audiences:
-                    self._send_once(audiences[key], system, now)
+                    self._send_once(audiences[key], system)
         return again
 
     def send_due(self, msg: RobotStatusMsg, system: int, audience: Audience, state: Schedule, now: float) -> float:
@@ -73,11 +73,11 @@ class MavlinkPublisher(RateLimitedPublisher[Schedule]):
         """An interval after the last one."""
         return state.last + _interval(audience)
 
-    def _send_once(self, audience: Audience, system: int, now: Instant) -> None:
-        """Send what the controllers published last. It is the present status, because they publish each change."""
+    def _send_once(self, audience: Audience, system: int) -> None:
+        """Send what the controllers published last, with its time."""
         for msg in self._latest.values():
             if msg.detail.system == system:
-                self._port.send(message_of(msg._replace(unix_us=now.unix_us)), system, audience)
+                self._port.send(message_of(msg), system, audience)
 
 
 def _interval(audience: Audience) -> float:

@@ -2,6 +2,7 @@
 
 These messages carry the system id of a vehicle and nothing else that names it. A group has the system id of its vehicle
 and is left out: a ground station would take the emergency stop of an arm for that of the vehicle, which may be live.
+Autopilots with the same system id have one status: what they do not agree on is unknown.
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ import math
 from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
-from ..interface import FIELDS, TRI_STATES, RobotMode, TriState
+from ..interface import FIELDS, STATES, TRI_STATES, RobotMode, RobotStatus, TriState
 from ..mavlink.definitions import NamedValueInt, Statustext
 from .rate_limiter import RateLimitedPublisher, Schedule
 
 if TYPE_CHECKING:
-    from ..interface import Audience, RobotStatus, RobotStatusMsg
+    from collections.abc import Sequence
+
+    from ..interface import Audience, RobotStatusMsg
 
 VALUE_INTERVAL: Final = 2.0  # s
 TEXT_INTERVAL: Final = 2.0  # s, the minimum
@@ -44,6 +47,16 @@ def text_of(status: RobotStatus) -> str:
     error = "?" if status.in_error is TriState.UNKNOWN else status.error_code
     text = TEXT.format(**words, mode=RobotMode(status.mode).name, error_code=error)
     return text[:LONGEST_TEXT]
+
+
+def agreed(statuses: Sequence[RobotStatus]) -> RobotStatus:
+    """What several vehicles agree on. Each of them may be in error."""
+    first = statuses[0]
+    values = {f.name: getattr(first, f.name) for f in STATES if len({getattr(s, f.name) for s in statuses}) == 1}
+    faulty = next((s for s in statuses if s.in_error is TriState.TRUE), None)
+    if faulty is not None:
+        values |= {"in_error": TriState.TRUE, "error_code": faulty.error_code}
+    return RobotStatus(**values)
 
 
 class _Sent:
@@ -75,6 +88,9 @@ class NamedValuePublisher(RateLimitedPublisher[_Sent]):
 
     def send_due(self, msg: RobotStatusMsg, system: int, audience: Audience, sent: _Sent, now: float) -> float:
         """Send the values and the text if they are due; return when the next one will be due, or inf."""
+        statuses = [other.status for other in self._latest.values() if other.detail.system == system]
+        if len(statuses) > 1:
+            msg = msg._replace(status=agreed(statuses))
         return min(self._values(msg, system, audience, sent, now), self._text(msg, system, audience, sent, now))
 
     def next_periodic(self, audience: Audience, sent: _Sent) -> float:

@@ -666,6 +666,22 @@ def test_a_board_behind_a_bridge_shows_unknown_while_the_bridge_is_down(
     wait_until(lambda: shown(http, "robot0")["mode"] == "AUTO", 40)
 
 
+def test_a_board_that_was_stopped_shows_nothing_that_waited_meanwhile(
+    broker: Start, gateway: Start, feeder: Start
+) -> None:
+    at = broker()
+    http = free_port()
+    it = gateway("board", at.url, "--http", f"127.0.0.1:{http}", "--mqtt-keepalive", str(KEEPALIVE))
+    it.wait_for_log(r"reading .*/\+")
+    feeder(at.url)
+    wait_until(lambda: shown(http, "robot0").get("mode") == "AUTO")
+    it.process.send_signal(signal.SIGSTOP)
+    time.sleep(3.5)
+    it.process.send_signal(signal.SIGCONT)
+    it.wait_for_log("this program was stopped, so what waits may be old")
+    wait_until(lambda: shown(http, "robot0").get("mode") == "AUTO", KEEPALIVE + SOON)
+
+
 def test_a_board_without_its_broker_shows_unknown(broker: Start, board: Start, feeder: Start) -> None:
     at = broker()
     http = board(at.url)

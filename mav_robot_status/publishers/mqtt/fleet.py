@@ -70,6 +70,12 @@ class Fleet:
         for robot in self._robots.values():
             robot.session = ""
 
+    def doubt(self, now: Instant) -> None:
+        """Nothing that was received is known to be current: every robot is unknown until two statuses arrive."""
+        for name, robot in self._robots.items():
+            robot.at, robot.state = -math.inf, ""
+            self._mark_unknown(name, robot, now)
+
     def take(self, topic: str, payload: bytes, retained: bool, now: Instant) -> None:
         """Read one message. Its content may be anything."""
         name, _, what = topic[len(self._start) :].partition("/")

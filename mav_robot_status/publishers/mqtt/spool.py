@@ -71,6 +71,10 @@ class Spool:
         self._newly: set[str] = set()
         """Robots whose count of dropped events is not written yet."""
         self._retry_at = self._swept_at = self._logged_at = -math.inf
+        self._first = self._place
+        """The events beyond this place are of this process."""
+        self._offset: float | None = None
+        """Unix time minus monotonic time at the first `flush`."""
         self._logged = sum(self.dropped.values())
         self.failed = False
         """Whether the last write failed."""
@@ -118,7 +122,7 @@ class Spool:
             return
         if now - self._swept_at >= SWEEP:
             self._swept_at = now
-            self._sweep(unix)
+            self._sweep(now, unix)
         if not (self._unwritten or self._finished or self._newly):
             return
         delivered = [event for event in self._unwritten if event.place in self._finished]
@@ -161,12 +165,16 @@ class Spool:
         self._db.executemany("INSERT OR REPLACE INTO dropped VALUES (?, ?)", counts)
         self._written, self._bytes = count, held
 
-    def _sweep(self, unix: float) -> None:
-        """Drop events that are too old."""
+    def _sweep(self, now: float, unix: float) -> None:
+        """Drop events that are too old. A clock that was set since does not age those of this process."""
+        if self._offset is None:
+            self._offset = unix - now
+        is_set = max(0.0, unix - now - self._offset)
         query = "SELECT place, robot, at, text FROM events WHERE at BETWEEN ? AND ?"
         for row in self._db.execute(query, (CLOCK_SET, unix - self._oldest)).fetchall():
             event = Event(*row)
-            if event.place not in self._finished:
+            is_old = event.place <= self._first or unix - is_set - event.at > self._oldest
+            if is_old and event.place not in self._finished:
                 self._finished[event.place] = event
                 self._drop(event.robot)
 

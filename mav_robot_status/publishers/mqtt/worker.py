@@ -174,7 +174,8 @@ class Worker:
             self._loop.watch(robot.connection)
         self._until_settled(deadline + PARTING)
         for robot in self._robots.values():
-            robot.connection.leave()
+            if robot.settled:  # otherwise OFFLINE has not arrived, and the will of the connection has to say it
+                robot.connection.leave()
 
     def _until_settled(self, deadline: float) -> None:
         while (left := deadline - self._clock().mono) > 0 and not all(r.settled for r in self._robots.values()):

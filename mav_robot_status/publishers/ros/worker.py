@@ -152,7 +152,7 @@ class Worker:
             self._errors.fails(lost)
         self._opened = self._clock().mono
         self._errors.opens()
-        for handle in sorted(self._unsent):
+        for handle in sorted(self._latest):  # all: what was sent into a connection that was lost may not have arrived
             self._send(self._latest[handle])
 
     def _lose(self, reason: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from mav_robot_status.clock import Instant, later
-from mav_robot_status.gateway.guarded_hardware import MOST_AT_ONCE, PAUSE, PERIOD, SLOW, GuardedHardware
+from mav_robot_status.gateway.guarded_hardware import LONGEST, MOST_AT_ONCE, PAUSE, PERIOD, SLOW, GuardedHardware
 from mav_robot_status.gateway.handle_check import INVALID
 from mav_robot_status.interface import (
     Detail,
@@ -35,6 +35,8 @@ class Arm(RobotHW):
         """Duration of each call in seconds."""
         self.fails = ""
         """The method that raises."""
+        self.silent = False
+        """Whether `read` sets no status."""
         self.calls: list[str] = []
         self.limits: list[int] = []
         self.handle = IndustrialRobotStatusHandle("arm")
@@ -48,7 +50,8 @@ class Arm(RobotHW):
 
     def read(self, now: Instant) -> None:
         self._do("read")
-        self.set_status(self.handle, self.reports)
+        if not self.silent:
+            self.set_status(self.handle, self.reports)
 
     def write(self, now: Instant) -> None:
         self._do("write")
@@ -208,12 +211,40 @@ def test_a_pause_of_several_times_its_duration_follows_a_slow_call(caplog: pytes
     arm.takes = 0.0
     turn(hardware)
     assert arm.calls == []
-    assert hardware.next_due() == pytest.approx(ended + PAUSE * 10 * SLOW)
-    arm.now = hardware.next_due()
+    assert hardware.next_due() == pytest.approx(START.mono + LONGEST + PERIOD)
+    arm.now = ended + PAUSE * 10 * SLOW
     turn(hardware)
     assert "read" in arm.calls
     assert [r.levelno for r in caplog.records] == [logging.WARNING]
     assert "took 1.0 s for one call" in caplog.text
+
+
+def test_the_handles_are_unknown_while_nobody_has_read_them_for_long() -> None:
+    """A process that was stopped for 5 s within a call does not call the interface for 20 s more."""
+    arm, hardware = guarded()
+    arm.takes = 5.0
+    hardware.read(START)
+    arm.takes = 0.0
+    assert arm.handle.status == RobotStatus()
+    assert (arm.handle.detail.link, hardware.changed) == (LinkState.LOST, True)
+    assert arm.handle.detail.inhibits[0].text == "its hardware interface is too slow"
+    end = hardware.next_due()
+    assert end == pytest.approx(START.mono + 5.0 + PAUSE * 5.0)
+    hardware.changed = False
+    arm.now = end
+    hardware.read(later(START, end - START.mono))
+    assert (arm.handle.status, hardware.changed) == (KNOWN, True)
+
+
+def test_handles_that_did_not_change_while_they_were_unknown_are_shown_again() -> None:
+    arm, hardware = guarded()
+    turn(hardware)
+    arm.takes = 5.0
+    hardware.read(START)
+    arm.takes, arm.silent = 0.0, True
+    arm.now = hardware.next_due()
+    hardware.read(later(START, arm.now - START.mono))
+    assert arm.handle.status == KNOWN
 
 
 def test_an_interface_that_is_always_due_is_called_a_hundred_times_a_second() -> None:

@@ -346,6 +346,30 @@ def test_a_standard_output_without_a_descriptor_is_an_error() -> None:
         made(Config(), Port(HEARER), io.StringIO())
 
 
+def test_a_handle_that_another_configuration_lacks_is_unknown_on_the_outputs_that_stay(stdout: TextIO) -> None:
+    port = Port(HEARER)
+    before, after = (Config(vehicles=(VehicleConfig(1, handle=name),)) for name in ("rover", "boat"))
+    pipeline = made(before, port, stdout)
+    take(pipeline, heartbeat(), START)
+    pipeline.tick(START)
+    assert lines(stdout)[-1]["drives_powered"] is False
+
+    def renewed() -> MavlinkRobotHW:
+        hardware = robot_hw(after)
+        hardware.take(heartbeat(armed=True), START)
+        return hardware
+
+    pipeline.change(after, renewed, later(START, 0.1))
+    pipeline.tick(later(START, 0.2))
+    assert lines(stdout)[-1]["handle"] == "boat"
+    last = [line for line in lines(stdout) if line["handle"] == "rover"][-1]
+    assert (last["link"]["state"], last["drives_powered"], last["system"]) == ("NEVER_SEEN", None, 1)
+    port.taken()
+    port.asked = [(HEARER.key, 1)]
+    pipeline.tick(later(START, 0.3))
+    assert {sent.message.drives_powered for sent in port.taken() if hasattr(sent.message, "drives_powered")} == {1}
+
+
 def test_a_removed_handle_has_a_last_line_and_its_controller_ends(stdout: TextIO) -> None:
     pipeline = made(Config(), Port(), stdout)
     take(pipeline, heartbeat(7), START)

@@ -61,6 +61,16 @@ def test_a_newer_message_replaces_the_waiting_one_and_keeps_its_place() -> None:
     assert speech.withheld == 1
 
 
+def test_a_message_that_is_overtaken_waits_no_longer() -> None:
+    speech = limited(0.0)
+    speech.wait("a", message("old"))
+    speech.forget("a")
+    speech.forget("b")
+    assert speech.withheld == 1
+    speech.renew(None)
+    assert drained(speech, 1) == []
+
+
 def test_without_a_limit_everything_is_sent_and_counted() -> None:
     speech = limited(None)
     for number in range(1000):

@@ -252,12 +252,13 @@ def test_a_new_audience_ends_the_rest(publisher: MavlinkPublisher, port: Port) -
     assert publisher.rests_until("robot") == pytest.approx(0.2, abs=0.02)
 
 
-def test_the_answer_to_a_request_has_the_present_time(publisher: MavlinkPublisher, port: Port) -> None:
-    publish(publisher, 0.0, msg())
+def test_the_answer_to_a_request_has_the_time_of_its_status(publisher: MavlinkPublisher, port: Port) -> None:
+    """A controller that publishes seldom has no present status."""
+    publish(publisher, 0.0, msg()._replace(unix_us=300_000))
     port.taken()
     port.asked = [("station", 1)]
-    publisher.service(Instant(0.7, 700_000))
-    assert [sent.message.time_usec for sent in port.taken()] == [700_000]
+    publisher.service(Instant(7.0, 7_000_000))
+    assert [sent.message.time_usec for sent in port.taken()] == [300_000]
 
 
 @pytest.mark.parametrize("interval", [None, math.inf])

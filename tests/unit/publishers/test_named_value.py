@@ -50,6 +50,21 @@ def test_a_group_is_not_taken_for_the_vehicle_whose_system_id_it_has(port: Port,
     assert port.taken() == []
 
 
+def test_autopilots_with_one_system_id_have_one_status_of_what_they_agree_on(
+    port: Port, mirror: NamedValuePublisher
+) -> None:
+    """A ground station knows the values by the system id alone, and keeps the last one."""
+    parked = DRIVING._replace(drives_powered=TriState.FALSE, motion_possible=TriState.FALSE, e_stopped=TriState.FALSE)
+    both = msg(DRIVING, Detail(1, 1), "one"), msg(parked, Detail(1, 2), "two")
+    publish(mirror, 0.0, *both)
+    agreed = RobotStatus(RobotMode.AUTO, in_motion=TriState.TRUE, in_error=TriState.FALSE)
+    assert {value for name, value in values(port.taken()) if name == "RS_STATE"} == {packed(agreed)}
+    publish(mirror, 10.0, both[0], msg(parked._replace(in_error=TriState.TRUE, error_code=4001), Detail(1, 2), "two"))
+    sent = values(port.taken())
+    assert ("RS_ERROR", 4001) in sent
+    assert {value for name, value in sent if name == "RS_STATE"} == {packed(agreed._replace(in_error=TriState.TRUE))}
+
+
 def texts(sent: list[Sent]) -> list[tuple[int, str]]:
     return [(s.message.severity, text(s.message.text)) for s in sent if isinstance(s.message, Statustext)]
 

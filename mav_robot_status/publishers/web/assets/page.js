@@ -79,7 +79,10 @@ function render() {
   freeze();
   if (one.handle === null) fleet.showAll([...page.robots.values()]);
   else if (robot) one.show(robot, page.robots);
-  else setText(at("who"), "The gateway has no such robot.");
+  else {
+    if (one.line) one.open(one.handle);
+    setText(at("who"), "The gateway has no such robot.");
+  }
   age();
 }
 

@@ -63,6 +63,11 @@ export class VehiclePage {
     at("verdict").replaceChildren(...banner(headline));
     at("causes").replaceChildren(...causeLists(line, headline));
     at("tiles").replaceChildren(...FIELDS.map((field) => tile(field, robot)), linkTile(robot));
+    if (this.stale) {
+      // the reasons are those of a status that is not known any more
+      at("why").replaceChildren();
+      at("no-why").hidden = false;
+    }
   }
 
   /** The title of the window. */

@@ -49,6 +49,19 @@ def test_a_status_is_live_once_a_second_one_follows() -> None:
     assert subscriber.shown["r"]["handle"] == "r"
 
 
+def test_after_a_doubt_a_robot_is_unknown_until_its_connection_and_two_statuses_arrive() -> None:
+    subscriber = Subscriber()
+    subscriber.receive("connection", "ONLINE", 0.0)
+    subscriber.status(0, 0.1)
+    assert subscriber.status(1, 1.1) == "AUTO"
+    subscriber.fleet.doubt(now(1.2))
+    assert subscriber.mode(1.2) == "UNKNOWN"
+    assert subscriber.status(2, 1.3) == "UNKNOWN"
+    assert subscriber.status(3, 1.4) == "UNKNOWN"
+    subscriber.receive("connection", "ONLINE", 1.5, retained=True)
+    assert subscriber.status(4, 1.6) == "AUTO"
+
+
 def test_a_retained_status_is_not_live() -> None:
     subscriber = Subscriber()
     subscriber.receive("connection", "ONLINE", 0.0, retained=True)

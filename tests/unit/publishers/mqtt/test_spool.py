@@ -128,12 +128,32 @@ def test_the_oldest_events_are_dropped_beyond_the_size_limit(path: str, caplog: 
 
 
 def test_events_beyond_the_age_limit_are_dropped(spool: Spool) -> None:
-    fill(spool, "before the clock was set", at=5.0)
     fill(spool, "a", at=CLOCK_SET)
-    fill(spool, "b", at=CLOCK_SET + 90.0, now=SWEEP)
-    spool.flush(2 * SWEEP, CLOCK_SET + 150.0)
-    assert texts(spool) == ["before the clock was set", "b"]
+    fill(spool, "b", at=CLOCK_SET + 90.0, now=90.0)
+    spool.flush(150.0, CLOCK_SET + 150.0)
+    assert texts(spool) == ["b"]
     assert spool.dropped["r"] == 1
+
+
+@pytest.mark.parametrize("before", [5.0, CLOCK_SET])
+def test_a_clock_that_is_set_does_not_make_the_events_of_this_process_old(spool: Spool, before: float) -> None:
+    fill(spool, "a", at=before)
+    spool.flush(SWEEP, before + SWEEP)
+    spool.flush(2 * SWEEP, CLOCK_SET + 864_000.0)
+    assert texts(spool) == ["a"]
+    spool.flush(200.0, CLOCK_SET + 864_200.0)
+    assert texts(spool) == (["a"] if before < CLOCK_SET else [])
+
+
+def test_the_events_of_an_earlier_process_age_by_the_clock(path: str) -> None:
+    earlier = Spool(path, 10_000, 100.0)
+    fill(earlier, "a", at=CLOCK_SET)
+    earlier.close(0.0, CLOCK_SET)
+    made = Spool(path, 10_000, 100.0)
+    made.flush(5.0, CLOCK_SET + 50.0)
+    made.flush(5.0 + SWEEP, CLOCK_SET + 864_000.0)
+    assert texts(made) == []
+    made.close(0.0, 0.0)
 
 
 def test_an_event_dropped_before_its_acknowledgement_counts_once(path: str) -> None:

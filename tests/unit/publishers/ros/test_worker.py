@@ -119,6 +119,7 @@ def test_a_lost_connection_is_opened_again_at_once_and_later_messages_are_sent(
     worker.hand_over([])
     wait_until(lambda: network.opened > 1)
     network.lost = lost  # type: ignore[method-assign]
+    network.wait_for(BYTES[0], BYTES[0])  # it may not have arrived
     worker.hand_over(MESSAGES[1:2])
     network.wait_for(BYTES[0], BYTES[1])
 

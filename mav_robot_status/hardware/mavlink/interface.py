@@ -13,10 +13,12 @@ from ...due_times import DueTimes
 from ...interface import LinkState, RobotHW
 from ...mavlink import definitions as mav
 from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
+from .armed import may_move
 from .autopilots.wanted import METADATA
 from .derive import derive
 from .evidence import EvidenceOfVehicle
 from .handlers import overheard, pass_time, transmitter_heard
+from .handlers.heartbeat import changed_way
 from .handlers.high_latency import follows, high_latency, sends_heartbeats
 from .handlers.parts import TRANSMITTERS
 from .identity import is_autopilot, named
@@ -38,7 +40,7 @@ from .rules.inhibits import inhibit
 from .settle import claimed, facts_of
 from .state import motion
 from .state.applet import is_word
-from .state.claims import CLOCKS, CONTINUES, COUNTED_APART, Claims, Outcome
+from .state.claims import BESIDE, CLOCKS, CONTINUES, COUNTED_APART, Claims, Outcome, are_alike, says_alike
 from .state.high_latency import LEAST_TIMEOUT, stated
 from .state.latest_messages import SILENCE
 from .state.vehicle_state import begin, timeout_of
@@ -267,6 +269,9 @@ class MavlinkRobotHW(RobotHW):
                 return
             claims.lasts = max(LEAST_TIMEOUT, timeout_of(state, self.options))
             if claims.way is way and not follows(state, message):
+                if may_move(beat[3]):  # late, or of another vehicle on this way
+                    claims.claim((BESIDE, way), way, beat[3], sequence, now)
+                    self._settle_claims(tracked, now)
                 return
         if tracked is not None and tracked.claims.way is not way:
             if not self._is_heard_elsewhere(tracked, beat, now, way):
@@ -506,15 +511,19 @@ class MavlinkRobotHW(RobotHW):
             claims.follow(way, sequence)
         booted = state.boot.at if state is not None and state.boot.clock_ms is not None else None
         if message_id == HEARTBEAT_ID and is_autopilot(message, ids[1]):
-            before = claims.way
+            before, former = claims.way, claims.mine
             outcome = claims.elsewhere(message, sequence, way, now, booted, tracked.timeout(self.options))
             if outcome is not Outcome.UNUSED:
                 if outcome is Outcome.EXCHANGED:
                     log.warning("vehicle %d.%d: another vehicle has these ids now, on %s", *ids, way)
                     tracked.state, tracked.boots = None, 0
                     tracked.requests = tracked.parameters = None
-                elif now.mono >= tracked.log_way_at:
-                    log.info("vehicle %d.%d: now heard on %s, no longer on %s", *ids, way, before)
+                else:
+                    known = claims.mine.booted if claims.mine else None
+                    if state is not None and not (are_alike(known, booted) and says_alike(former.heartbeat, message)):
+                        changed_way(state, now.mono)
+                    if now.mono >= tracked.log_way_at:
+                        log.info("vehicle %d.%d: now heard on %s, no longer on %s", *ids, way, before)
                 tracked.log_way_at = now.mono + LOG_WAYS
                 return True
         elif message_id in CLOCKS:

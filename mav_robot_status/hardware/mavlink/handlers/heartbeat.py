@@ -14,13 +14,14 @@ from ....mavlink.enumerations import (
 )
 from .. import causes
 from ..autopilots.profile import EmergencyStop, Uninit
+from ..state import applet as applet_rules
 from ..state import arming_report, estop, event_sequence, latches, outputs, readiness, sensors
 from ..state import boot_clock as boot_rules
 from ..state.heartbeat_history import armed_before, next_heartbeat
 from ..state.high_latency import is_statement
 from ..state.latest_messages import LatestMessages, heard
 from ..state.motion import Motion
-from ..state.vehicle_state import VehicleState, begin, timeout_of
+from ..state.vehicle_state import VehicleState, begin, honours_stop, timeout_of
 from .outputs import look_again
 from .statustext import pass_time
 
@@ -89,6 +90,23 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         state.failsafe = None
         state.latches = latches.calmed(state.latches, before.state_since.mono)
         seen.unsettled = True
+
+
+def changed_way(state: VehicleState, now: float) -> None:
+    """Another way of the vehicle counts now, and nothing shows that it is the same vehicle.
+
+    What was said or shown of a stop may be that of another one: a doubt remains.
+    """
+    word, status = state.applet, state.latest.sys_status
+    if word is not None:
+        state.applet = None
+        if applet_rules.stops(word, honours_stop(state)):
+            state.stop = estop.doubted(state.stop, estop.ANOTHER_WAY, now)
+    if status is not None and sensors.safety_switch_on(status.message):
+        state.latest.sys_status = None
+    state.stop = estop.unsure(state.stop, estop.ANOTHER_WAY, now)
+    state.asked = ()
+    state.latches = latches.clear(state.latches, (causes.TERMINATION_ANNOUNCED,))
 
 
 def _another(state: VehicleState, message: Heartbeat, now: Instant) -> None:

@@ -75,7 +75,10 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
         if state.profile.stops.outputs_show and state.heartbeats.armed and not honours_stop(state):
             return
         engaged = effect is Effect.ESTOP
-        state.stop = estop.said(state.stop, engaged, words, now)
+        if engaged and state.heartbeats.armed and estop.REFUSES in words:
+            state.stop = estop.doubted(state.stop, estop.LATE, now.mono)  # it was armed since, or is checked anew
+        else:
+            state.stop = estop.said(state.stop, engaged, words, now)
         state.assumed_free = False
         if state.profile.texts.stop_text is StopText.STATE:
             state.failsafe = _say(state.failsafe, words, now)

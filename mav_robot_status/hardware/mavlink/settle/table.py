@@ -25,7 +25,6 @@ from ..state import (
     text_assembly,
 )
 from ..state.claims import HOLD, LIVE, NEVER
-from ..state.high_latency import is_statement
 from ..state.latest_messages import FRESH
 from ..state.vehicle_state import timeout_of
 from .causes import arming, explained, faults, latched, reported_by_parts, sys_status
@@ -132,7 +131,11 @@ def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Cl
         since = conflict.since.unix_us
         armed = _armed(state)
         all_armed = armed is TRUE and moment.has_come(claims.disarmed_at + HOLD)
-        all_disarmed = armed is FALSE and moment.has_come(claims.armed_at + HOLD)
+        all_disarmed = (
+            armed is FALSE
+            and moment.has_come(claims.armed_at + HOLD)
+            and all(moment.has_come(claim.doubt_at + LIVE) for claim in claims.others.values())
+        )
         one_mode = moment.has_come(claims.differed_at + HOLD)
         return new(Claimed, (since, True, all_armed, all_disarmed, one_mode))
     if _is_at_rest(state, mine) and (
@@ -146,9 +149,7 @@ def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Cl
 def _is_at_rest(state: VehicleState, mine: Claim | None) -> bool:
     """Whether the selected sender says disarmed, or armed in a state without motion."""
     armed = _armed(state)
-    return armed is FALSE or (
-        armed is TRUE and mine is not None and not is_statement(mine.heartbeat) and not may_move(mine.heartbeat)
-    )
+    return armed is FALSE or (armed is TRUE and mine is not None and not may_move(mine.heartbeat))
 
 
 def _armed(state: VehicleState) -> TriState:

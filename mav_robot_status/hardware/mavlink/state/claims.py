@@ -296,7 +296,9 @@ class Claims(Generic[C]):
                 self.forget()
                 return
             key = max(left, key=lambda key: left[key].at)
+            said_at = max((c.doubt_at for c in (self.mine, *self.others.values()) if c is not None), default=NEVER)
             self.mine = left.pop(key)
+            self.mine.former_at = max(self.mine.former_at, said_at)  # a way that is gone cannot take it back
             self.way, self.sequence, self.broken = self.mine.way, self.mine.sequence, True
         self.others = left
 
@@ -348,8 +350,10 @@ class Claims(Generic[C]):
         if is_other:
             self.contradict("HIGH_LATENCY2.type and autopilot differ from HEARTBEAT", way, now)
         key = BESIDE, way
-        agrees = mine.armed or not is_armed(statement)
+        agrees = may_move(mine.heartbeat) or not may_move(statement)
         if way is self.way and not is_other and agrees and key not in self.others:
+            if may_move(statement):
+                mine.armed_at = max(mine.armed_at, self._counts_from(statement, now.mono))
             return
         former = self.others.get(way)
         if former is not None and is_statement(former.heartbeat):  # from when its way was selected
@@ -492,6 +496,16 @@ def _disarms(heartbeat: Heartbeat, before: Heartbeat) -> bool:
     if tells_armed(before):
         return may_move(before) and not may_move(heartbeat)
     return tells_armed(heartbeat) and not may_move(heartbeat)
+
+
+def says_alike(one: Heartbeat, other: Heartbeat) -> bool:
+    """Whether one vehicle may say both at the same time."""
+    return _stance(one) == _stance(other)
+
+
+def are_alike(one: float | None, other: float | None) -> bool:
+    """Whether two boot times are known and may be those of one autopilot."""
+    return one is not None and other is not None and abs(one - other) <= APART
 
 
 def _are_apart(one: float | None, other: float | None) -> bool:

@@ -47,6 +47,8 @@ REPEATED: Final = 35.0
 """Seconds after which a PreArm text that is no longer repeated (every 30 s) is over."""
 
 
+REFUSES: Final = "Emergency Stopped"
+"""In the texts of ArduPilot's pre-arm checks and of a refused arming."""
 MOVED_SWITCH: Final = "MotorEStop"
 """The text of a switch of option 31 when it moves (RC_Channel.cpp): `RC7: MotorEStop HIGH`."""
 MOVES: Final = 1.5
@@ -77,6 +79,8 @@ LINK_LOST: Final = "a stop was reported, and the link has been lost since"
 UNDER_POWER: Final = "a stop was reported, and since then there are signs of power"
 UNANSWERED: Final = "a command to stop or to release has no clear acknowledgement"
 HELD: Final = "the motor outputs were held by a stop, and no release was seen"
+ANOTHER_WAY: Final = "a stop was reported on another way, and nothing shows that it was the same vehicle"
+LATE: Final = "a text that refuses the arming has arrived while the vehicle is armed"
 SWITCHED_BACK: Final = "a switch reported a stop, and is not in its stop position any more"
 SHUT_DOWN: Final = "the motors were switched off while armed, and have not been driven since"
 ARMED: Final = "a stop was reported before the arming, and this firmware may arm while it is stopped"
@@ -94,7 +98,7 @@ def said(stop: Stop, engaged: bool, text: str | None, now: Instant, source: str 
         source=source or f"STATUSTEXT: {text}",
         since=stop.since if stop.said is value else now,
         last=now.mono,
-        repeats=engaged and text is not None and "Emergency Stopped" in text,
+        repeats=engaged and text is not None and REFUSES in text,
         ready=0 if engaged else stop.ready,
         ready_at=stop.ready_at,
     )

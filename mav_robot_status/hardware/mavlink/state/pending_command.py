@@ -15,7 +15,7 @@ from ....mavlink.enumerations import (
     MAV_RESULT_IN_PROGRESS,
 )
 from ....values import NamedTuple
-from .estop import MOTOR_ESTOP
+from .estop import ARM_EMERGENCY_STOP, MOTOR_ESTOP
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -23,7 +23,15 @@ if TYPE_CHECKING:
     from .estop import Stop
 
 COMMANDS: Final = frozenset({MAV_CMD_DO_FLIGHTTERMINATION, MAV_CMD_DO_AUX_FUNCTION})
-LOW, HIGH = 0, 2  # the positions of a switch
+LOW, MIDDLE, HIGH = 0, 1, 2  # the positions of a switch
+ENGAGES: Final[dict[tuple[float, float], bool]] = {
+    (MOTOR_ESTOP, LOW): False,
+    (MOTOR_ESTOP, HIGH): True,
+    (ARM_EMERGENCY_STOP, LOW): True,
+    (ARM_EMERGENCY_STOP, MIDDLE): False,
+    (ARM_EMERGENCY_STOP, HIGH): False,
+}
+"""Whether a function in a position engages (True) or releases the emergency stop: RC_Channel.cpp."""
 PATIENCE: Final = 5.0  # s for an acknowledgement
 MOST: Final = 8
 """Outstanding commands that are remembered."""
@@ -46,9 +54,9 @@ class PendingCommand(NamedTuple):
     @property
     def engages(self) -> bool | None:
         """Whether it engages (True) or releases (False) the motor emergency stop. None: neither."""
-        if self.command != MAV_CMD_DO_AUX_FUNCTION or self.param1 != MOTOR_ESTOP:
+        if self.command != MAV_CMD_DO_AUX_FUNCTION:
             return None
-        return {LOW: False, HIGH: True}.get(self.param2)  # type: ignore[call-overload, no-any-return]
+        return ENGAGES.get((self.param1, self.param2))
 
 
 Pending = tuple[PendingCommand, ...]

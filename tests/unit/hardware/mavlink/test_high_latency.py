@@ -641,6 +641,16 @@ def test_the_first_message_after_heartbeats_is_held_against_a_disarmed_sender_fo
         assert sky.wait(1.0).drives_powered is not FALSE
 
 
+def test_of_two_vehicles_on_one_satellite_the_disarmed_one_with_the_later_clock_is_not_believed() -> None:
+    sky = Sky()
+    for number in range(12):
+        sky.send(ardupilot(DISARMED)._replace(timestamp=5_000_000 + 5000 * number), "satellite")
+        sky.wait(1.0)
+        status = sky.send(ardupilot(ARMED)._replace(timestamp=100_000 + 5000 * number), "satellite")
+        assert status.drives_powered is not FALSE
+        assert sky.wait(4.0).drives_powered is not FALSE
+
+
 @pytest.mark.parametrize("message", [ardupilot(), px4()])
 def test_a_statement_equals_no_heartbeat_that_can_arrive(message: mav.HighLatency2) -> None:
     statement = stated(message)

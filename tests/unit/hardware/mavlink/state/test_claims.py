@@ -62,6 +62,9 @@ class Air:
         message = mav.Heartbeat(mode, vehicle_type, 3, 217 | flags if armed else 89, state if armed else 3, 3)
         return self.send(message, 0, way, sequence, ids)
 
+    def text(self, way: Any, words: str) -> None:
+        self.send(mav.Statustext(6, words.encode(), 0, 0), 253, way, None, (1, 1))
+
     def attitude(self, way: Any, clock_ms: int, sequence: int | None = None) -> None:
         self.send(mav.Attitude(clock_ms, 0.0, 0.0, 0.0), 30, way, sequence, (1, 1))
 
@@ -174,6 +177,53 @@ def test_a_dropout_of_an_armed_vehicle_does_not_make_a_sender_the_vehicle_that_c
         air.wait(0.5)
         assert not air.beat("forger", armed=True, **says)
         assert air.status.motion_possible is TRUE
+
+
+@pytest.mark.parametrize("mode", [0, 3])
+def test_what_one_sender_said_of_its_stop_is_in_doubt_when_another_way_counts(mode: int) -> None:
+    """The two may be two vehicles: nothing shows that they are one."""
+    air = Air()
+    for _ in range(3):
+        air.beat("wifi", armed=True, mode=mode)
+        air.wait(0.5)
+        air.beat("radio", armed=True)
+        air.wait(0.5)
+    air.text("wifi", "RC7: MotorEStop HIGH")
+    assert air.status.e_stopped is TRUE
+    for _ in range(60):
+        air.wait(1.0)
+        air.beat("radio", armed=True)
+    assert air.status.mode is RobotMode.AUTO
+    assert (air.status.e_stopped, air.status.drives_powered) == (UNKNOWN, UNKNOWN)
+
+
+def test_a_vehicle_whose_clock_is_the_same_on_two_ways_stays_stopped_on_the_other_way() -> None:
+    air = Air()
+    for second in range(8):
+        for way in ("wifi", "radio"):
+            air.beat(way, armed=True)
+            air.attitude(way, 60_000 + 1000 * second)
+        air.wait(1.0)
+    air.text("wifi", "RC7: MotorEStop HIGH")
+    assert air.status.e_stopped is TRUE
+    for second in range(3):
+        air.wait(1.0)
+        air.beat("radio", armed=True)
+        air.attitude("radio", 68_000 + 1000 * second)
+    assert (air.status.e_stopped, air.status.drives_powered) == (TRUE, FALSE)
+
+
+def test_a_link_that_is_closed_does_not_take_back_that_its_vehicle_is_armed() -> None:
+    air = Air()
+    for _ in range(3):
+        air.beat("radio", armed=True)
+        air.beat("wifi")
+        air.wait(1.0)
+    air.beat("radio", armed=True)
+    air.claims.keep(lambda way: way == "wifi")
+    air.wait(0.1)
+    air.beat("wifi")
+    assert air.status.drives_powered is UNKNOWN
 
 
 def test_a_vehicle_on_two_ways_that_is_stopped_is_unknown_until_both_say_so() -> None:

@@ -194,7 +194,6 @@ def test_a_px4_that_shows_its_stops_is_trusted() -> None:
         ("RC7: MotorEStop HIGH", 1000, TriState.UNKNOWN),  # the text of the release was lost
         ("RC7: MotorEStop HIGH", 1900, TriState.TRUE),
         ("RC7: MotorEStop HIGH", 0, TriState.TRUE),  # no pulse
-        ("Arm: Motors Emergency Stopped", 1000, TriState.TRUE),  # a command or a script may have engaged it
     ],
 )
 def test_a_stop_by_a_switch_is_in_doubt_when_the_switch_is_in_another_position(
@@ -208,6 +207,17 @@ def test_a_stop_by_a_switch_is_in_doubt_when_the_switch_is_in_another_position(
     flight.wait(2)
     assert flight.status.e_stopped is expected
     assert ("STOP_UNCERTAIN" in flight.inhibits) is (expected is TriState.UNKNOWN)
+
+
+@pytest.mark.parametrize("text", ["Arm: Motors Emergency Stopped", "PreArm: Motors Emergency Stopped"])
+def test_a_refusal_that_arrives_while_armed_is_only_a_doubt(text: str) -> None:
+    """The text waited in the autopilot's queue. The stop was released, and the vehicle armed, meanwhile."""
+    flight = copter()
+    flight.wait(3)
+    flight.hb(armed=True, state=ACTIVE).text(text, 2)
+    seen = {status.e_stopped for status in flight.wait(60)}
+    assert TriState.TRUE not in seen
+    assert "STOP_UNCERTAIN" in flight.inhibits
 
 
 @pytest.mark.parametrize(("option", "expected"), [(165.0, TriState.UNKNOWN), (153.0, TriState.FALSE)])

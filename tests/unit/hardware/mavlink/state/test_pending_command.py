@@ -119,6 +119,14 @@ def test_an_answer_from_another_system_is_ignored() -> None:
     assert stop(driving()).send(ack(), ids=(1, 154)).status.e_stopped is UNKNOWN
 
 
+@pytest.mark.parametrize(("position", "stopped"), [(LOW, TRUE), (MIDDLE, FALSE), (HIGH, FALSE)])
+def test_function_165_engages_in_its_low_position_and_releases_in_the_others(position: int, stopped: TriState) -> None:
+    flight = stop(driving(), HIGH if stopped is FALSE else LOW).send(ack())
+    flight.wait(1.0)
+    flight.send(command(AUX, 165, position), STATION)
+    assert flight.send(ack()).status.e_stopped is stopped
+
+
 @pytest.mark.parametrize(("seconds", "stopped"), [(4.9, TRUE), (5.1, UNKNOWN)])
 def test_an_answer_counts_for_five_seconds(seconds: float, stopped: TriState) -> None:
     flight = stop(driving())

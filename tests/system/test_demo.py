@@ -17,6 +17,7 @@ from mav_robot_status.testing import BY_NAME, decode
 from mav_robot_status.testing.scenario import Action, ending
 
 from ..deadline import Deadline, wait_until
+from ..ports import free_port
 from .gateway_process import Gateway, run
 from .screen import Screen
 
@@ -46,12 +47,6 @@ def heard(listener: socket.socket, enough: Callable[[set[int]], bool]) -> set[in
             messages = decode(listener.recv(2000))
             found |= {m.get_srcSystem() for m in messages if m.get_type() == "HEARTBEAT" and m.autopilot != 8}
     return found
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_port:
-        any_port.bind(("127.0.0.1", 0))
-        return int(any_port.getsockname()[1])
 
 
 def test_a_terminal_shows_the_live_table_and_the_story(demo: Callable[..., Screen]) -> None:

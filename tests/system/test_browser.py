@@ -151,6 +151,30 @@ def test_the_page_reports_a_gateway_that_answers_while_its_loop_hangs(browser: B
         browser.wait(f"{WORD} === 'UNKNOWN'")
 
 
+def test_the_reasons_of_the_fields_end_when_nothing_arrives_from_the_gateway(
+    browser: Browser, gateway: Callable[..., Gateway], wire: Callable[..., Wire]
+) -> None:
+    gate = gateway(*PAGE)
+    wire(gate.address).beating()
+    browser.driver.get(f"{url(gate)}/#/{HANDLE}")
+    browser.wait("document.querySelector('#why').innerText.includes('off')")
+    gate.process.send_signal(signal.SIGSTOP)
+    try:
+        browser.wait("document.querySelector('#why').innerText === ''")
+        assert browser.ask("return document.querySelector('#no-why').hidden") is False
+    finally:
+        gate.process.send_signal(signal.SIGCONT)
+
+
+def test_a_robot_that_the_gateway_no_longer_has_is_not_shown(browser: Browser, page: Page) -> None:
+    page.only([scenes.parked("rover"), scenes.parked("boat")])
+    browser.driver.get(f"{page.url}#/rover")
+    browser.wait(f"{WORD} === 'CANNOT MOVE'")
+    page.only([scenes.parked("boat")])
+    browser.wait("document.querySelector('#who').innerText === 'The gateway has no such robot.'")
+    assert browser.text("#verdict") == browser.text("#tiles") == browser.text("#why") == ""
+
+
 def test_a_lost_link_says_since_when_and_what_was_last_known(
     browser: Browser, gateway: Callable[..., Gateway], wire: Callable[..., Wire]
 ) -> None:

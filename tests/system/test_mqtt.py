@@ -666,6 +666,46 @@ def test_a_board_behind_a_bridge_shows_unknown_while_the_bridge_is_down(
     wait_until(lambda: shown(http, "robot0")["mode"] == "AUTO", 40)
 
 
+class Deaf:
+    """A broker that accepts connections and acknowledges nothing. It keeps what each of them has sent."""
+
+    def __init__(self) -> None:
+        self.server = socket.create_server(("127.0.0.1", 0))
+        self.url = f"mqtt://127.0.0.1:{self.server.getsockname()[1]}/{PREFIX}"
+        self.sent: list[bytearray] = []
+        self.ended = 0
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                threading.Thread(target=self._serve, args=(self.server.accept()[0],), daemon=True).start()
+
+    def _serve(self, client: socket.socket) -> None:
+        self.sent.append(bytearray())
+        mine = self.sent[-1]
+        with client, contextlib.suppress(OSError):
+            mine += client.recv(4096)
+            client.sendall(b"\x20\x02\x00\x00")  # CONNACK
+            while data := client.recv(4096):
+                mine += data
+        self.ended += 1
+
+    def close(self) -> None:
+        self.server.close()
+
+
+def test_a_gateway_that_stops_while_events_wait_leaves_the_will_to_the_broker(started: Start, autopilot: Start) -> None:
+    """A DISCONNECT would cancel the will, and the robot would stay ONLINE with its last status."""
+    with contextlib.closing(Deaf()) as deaf:
+        gate = started(deaf.url, "--mqtt-version", "3.1.1", "--mqtt-keepalive", "60")
+        autopilot(ardurover.READY, gate.address)
+        wait_until(lambda: any(b'"session"' in sent for sent in deaf.sent), what="no event")
+        assert gate.stop() == 0
+        wait_until(lambda: deaf.ended == len(deaf.sent))
+        assert not any(sent.endswith(b"\xe0\x00") for sent in deaf.sent)
+
+
 def test_a_board_that_was_stopped_shows_nothing_that_waited_meanwhile(
     broker: Start, gateway: Start, feeder: Start
 ) -> None:

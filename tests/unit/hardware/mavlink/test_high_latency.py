@@ -15,7 +15,7 @@ from mav_robot_status.interface import LinkState, RobotMode, TriState
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.mavlink import enumerations as mavlink
 
-from .driver import PX4, QUAD, ROVER, frame_of
+from .driver import ARDUPILOT, PX4, QUAD, ROVER, frame_of
 from .high_latency import ARMED, DISARMED, Sky, ardupilot, inav, px4, radio_room
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
@@ -641,12 +641,48 @@ def test_the_first_message_after_heartbeats_is_held_against_a_disarmed_sender_fo
         assert sky.wait(1.0).drives_powered is not FALSE
 
 
+def test_a_conflict_of_two_disarmed_senders_does_not_outvote_an_armed_message_on_a_third_way() -> None:
+    sky = Sky()
+    for second in range(40):
+        sky.beat("radio")
+        sky.send(mav.Heartbeat(4, 10, ARDUPILOT, 81, 3, 3), "wifi")
+        if second % 15 == 5:
+            sky.send(ardupilot(ARMED), "satellite")
+        status = sky.wait(1.0)
+        if second > 5:
+            assert status.drives_powered is not FALSE
+    assert 9002 in sky.codes
+
+
+def test_an_armed_message_is_held_against_heartbeats_in_a_state_without_motion_on_its_way() -> None:
+    sky = Sky()
+    for number in range(10):
+        sky.send(mav.Heartbeat(4, QUAD, ARDUPILOT, 209, 8, 3), "radio", sequence=number)
+        sky.wait(0.5)
+        status = sky.send(ardupilot(ARMED), "radio", sequence=number + 128)
+        assert status.e_stopped is not TRUE
+        sky.wait(0.5)
+
+
+def test_an_armed_message_beside_heartbeats_is_held_against_a_disarmed_sender_after_they_end() -> None:
+    sky = Sky()
+    for _ in range(5):
+        sky.beat("radio", armed=True)
+        sky.wait(1.0)
+    sky.wait(1.0)
+    sky.send(ardupilot(ARMED), "radio")
+    sky.wait(1.6)
+    for _ in range(30):
+        assert sky.beat("forger").drives_powered is not FALSE
+        assert sky.wait(1.0).drives_powered is not FALSE
+
+
 def test_of_two_vehicles_on_one_satellite_the_disarmed_one_with_the_later_clock_is_not_believed() -> None:
     sky = Sky()
     for number in range(12):
-        sky.send(ardupilot(DISARMED)._replace(timestamp=5_000_000 + 5000 * number), "satellite")
+        sky.send(ardupilot(DISARMED), timestamp=5_000_000 + 5000 * number)
         sky.wait(1.0)
-        status = sky.send(ardupilot(ARMED)._replace(timestamp=100_000 + 5000 * number), "satellite")
+        status = sky.send(ardupilot(ARMED), timestamp=100_000 + 5000 * number)
         assert status.drives_powered is not FALSE
         assert sky.wait(4.0).drives_powered is not FALSE
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import pathlib
 import re
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import textwrap
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -246,6 +248,28 @@ def test_a_vehicle_of_a_removed_link_ends_with_never_seen(service: Callable[...,
     last = it.gate.wait_for(lambda s: s["system"] == 1 and s["link"]["state"] == "NEVER_SEEN", after=sent)
     assert it.gate.wait_for_lines(10, after=last.at).status["handle"] == name
     assert not [line for line in it.gate.lines if line.status["system"] == 1 and line.at > last.at]
+
+
+def test_a_handle_that_a_reload_renames_ends_on_the_outputs_that_stay(
+    service: Callable[..., Service], wire: OpenWire
+) -> None:
+    port, http = any_port(), free_port()
+    text = f"links: ['udpin:127.0.0.1:{port}']\nvehicles: [{{system: 1, handle: %s}}]\n"
+    it = service(text % "rover", "--http", f"127.0.0.1:{http}")
+    rover = wire(("127.0.0.1", port)).beating()
+    it.gate.wait_for(lambda s: s["handle"] == "rover" and s["drives_powered"] is False)
+
+    sent = it.reload(text % "boat")
+    rover.beat(armed=True)
+    it.gate.wait_for(lambda s: s["handle"] == "boat" and s["drives_powered"] is True, after=sent)
+    last = [line.status for line in it.gate.lines if line.status["handle"] == "rover"][-1]
+    assert (last["link"]["state"], last["drives_powered"]) == ("NEVER_SEEN", None)
+
+    def served() -> list[str]:
+        with urllib.request.urlopen(f"http://127.0.0.1:{http}/api/v1/vehicles", timeout=10) as answer:
+            return [line["handle"] for line in json.load(answer)]
+
+    wait_until(lambda: served() == ["boat"])
 
 
 def test_a_vehicle_gets_the_handle_of_the_new_configuration(service: Callable[..., Service], wire: OpenWire) -> None:

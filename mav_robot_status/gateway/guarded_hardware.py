@@ -86,11 +86,10 @@ class GuardedHardware:
         self._guard.call(None, self._check.check, self.handles, now)
         is_late = self.paused and self._clock() - self._read_at > LONGEST
         if is_late is not self._suspended and not self._guard.broken:
-            self._suspended = self.changed = is_late
+            self._suspended, self.changed = is_late, True
             if is_late:
                 self._guard.call(None, self._check.suspend, self.handles, "its hardware interface is too slow", now)
             else:
-                self.changed = True
                 self._guard.call(None, self._check.resume, self.handles, now)
         if self._guard.broken and not self._lost:
             self._lost = self.changed = True

@@ -277,6 +277,7 @@ class Pipeline:
                 forget(name)
         for name in names:
             del self._seen[name]
+        self._served = {(key, name) for key, name in self._served if name in self._seen}
 
     def _add_controller(self, config: ControllerConfig) -> None:
         """Raises ConfigError if the controller cannot be made."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 MOST_CHANGES: Final = 5
 WINDOW: Final = 1.0  # s
 SLACK: Final = 0.01  # s: a message this much early still counts as periodic
-LONGEST_REST: Final = 1.0  # s: an audience that is new, or asks for one status, gets one that is no older
+LONGEST_REST: Final = 1.0  # s: a new audience, or one that asks for a status, gets one that is at most this old
 
 S = TypeVar("S")
 

@@ -33,7 +33,7 @@ AGES: Final = 0.5
 """Seconds between two updates of the ages."""
 MOST_CHANGES: Final = 100
 LOW: Final = 18
-"""The height below which there is no room for the details in addition to the table."""
+"""Below this height there is no room for the details under the table."""
 PATIENCE: Final = 3.0
 """Seconds for the terminal to take the last output."""
 ENDS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

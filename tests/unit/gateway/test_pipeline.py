@@ -370,6 +370,16 @@ def test_a_handle_that_another_configuration_lacks_is_unknown_on_the_outputs_tha
     assert {sent.message.drives_powered for sent in port.taken() if hasattr(sent.message, "drives_powered")} == {1}
 
 
+def test_a_handle_that_was_removed_before_does_not_stop_another_configuration(stdout: TextIO) -> None:
+    pipeline = made(Config(), Port(), stdout)
+    take(pipeline, heartbeat(7), START)
+    pipeline.tick(START)
+    pipeline.hw.handles.remove_handle(f"{NAME}/7.1")
+    pipeline.tick(later(START, 0.1))
+    pipeline.change(Config(), lambda: robot_hw(Config()), later(START, 0.2))
+    pipeline.tick(later(START, 0.3))
+
+
 def test_a_removed_handle_has_a_last_line_and_its_controller_ends(stdout: TextIO) -> None:
     pipeline = made(Config(), Port(), stdout)
     take(pipeline, heartbeat(7), START)

@@ -106,8 +106,8 @@ class Texts(NamedTuple):
     sends_events: bool
     """Whether the levels of an EVENT have the meaning of STATUSTEXT severities."""
     failsafe_is_any: Mapping[Family, re.Pattern[str]]
-    """By family, the texts about a failsafe that name the radio or the ground station regardless of which is lost; the
-    text that clears one clears both."""
+    """By family, the texts about a lost radio or ground station that may name the wrong one. The text that clears one
+    clears both."""
     firmware: Mapping[str, Family]
     """The names of the firmware in the text of its boot, which gives its version, each with its kind of vehicle."""
 

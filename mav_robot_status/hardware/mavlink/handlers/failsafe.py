@@ -21,7 +21,7 @@ TIMEOUT: Final = 1.5
 
 
 def _names_either(state: VehicleState, text: str | None) -> bool:
-    """Whether a text names the radio or the ground station regardless of which is lost."""
+    """Whether a text about a lost radio or ground station may name the wrong one."""
     pattern = state.profile.texts.failsafe_is_any.get(state.family)
     return pattern is not None and text is not None and pattern.match(text) is not None
 

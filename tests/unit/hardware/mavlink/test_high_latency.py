@@ -627,11 +627,17 @@ def test_no_order_of_messages_calls_a_vehicle_safe_that_says_armed_by_high_laten
         assert sky.wait(pause).drives_powered is not FALSE
 
 
-def test_the_first_message_after_heartbeats_is_held_against_a_disarmed_sender_for_a_minute() -> None:
+def after_heartbeats(way: str) -> Sky:
+    """A sky in which an armed vehicle sent five HEARTBEATs."""
     sky = Sky()
     for _ in range(5):
-        sky.beat("truth", armed=True)
+        sky.beat(way, armed=True)
         sky.wait(1.0)
+    return sky
+
+
+def test_the_first_message_after_heartbeats_is_held_against_a_disarmed_sender_for_a_minute() -> None:
+    sky = after_heartbeats("truth")
     sky.wait(5.0)
     sky.send(ardupilot(ARMED), "truth")
     for second in range(50):
@@ -665,10 +671,7 @@ def test_an_armed_message_is_held_against_heartbeats_in_a_state_without_motion_o
 
 
 def test_an_armed_message_beside_heartbeats_is_held_against_a_disarmed_sender_after_they_end() -> None:
-    sky = Sky()
-    for _ in range(5):
-        sky.beat("radio", armed=True)
-        sky.wait(1.0)
+    sky = after_heartbeats("radio")
     sky.wait(1.0)
     sky.send(ardupilot(ARMED), "radio")
     sky.wait(1.6)

@@ -435,26 +435,27 @@ def test_the_throttle_channel_shows_the_stop_of_a_rover_and_its_end() -> None:
     assert flight.status.e_stopped is FALSE
 
 
-def test_without_attitude_an_assumed_throttle_channel_at_rest_does_not_show_a_stop() -> None:
-    """A rover with a motor on each side turns about the side that stands still."""
+def driving(mode: int, values: list[int], throttle: int) -> tuple[Flight, Outputs]:
+    """An armed rover on assumed channels, for 5 s."""
     flight = rover()
     outputs = Outputs(flight, [1500, 0, 1500])
     flight.wait(15)
-    flight.hb(armed=True, state=ACTIVE, mode=15)
-    outputs.set([1655, 0, 1655], 31)
+    flight.hb(armed=True, state=ACTIVE, mode=mode)
+    outputs.set(values, throttle)
     flight.wait(5)
+    return flight, outputs
+
+
+def test_without_attitude_an_assumed_throttle_channel_at_rest_does_not_show_a_stop() -> None:
+    """A rover with a motor on each side turns about the side that stands still."""
+    flight, outputs = driving(15, [1655, 0, 1655], 31)
     outputs.set([1655, 0, 1500], 31)
     assert {status.e_stopped for status in flight.wait(5)} == {FALSE, UNKNOWN}
 
 
 def test_a_rover_that_comes_to_rest_while_vfr_hud_is_lost_is_not_stopped() -> None:
-    flight = rover()
-    outputs = Outputs(flight, [1500, 0, 1500])
-    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0.0, 0.0, 0.0), hz=2)
-    flight.wait(15)
-    flight.hb(armed=True, state=ACTIVE, mode=0)
-    outputs.set([1500, 0, 1655], 40)
-    flight.wait(5)
+    flight, outputs = driving(0, [1500, 0, 1655], 40)
+    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0.0, 0.0, 0.0), hz=2).wait(5)
     flight.stop("vfr_hud")
     outputs.set([1500, 0, 1500], 0)
     seen = flight.wait(10)

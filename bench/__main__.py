@@ -19,7 +19,6 @@ from .case import Bench, Case
 from .cases import (
     arm,
     forward,
-    kernel_filter,
     latency,
     logs,
     memory,
@@ -46,7 +45,7 @@ if TYPE_CHECKING:
 CASES: Final[dict[str, Case]] = {
     module.CASE.name: module.CASE
     for module in (
-        parse, replay, udp, kernel_filter, saturate, forward, latency, arm, silent, vehicles, memory, resident, logs,
+        parse, replay, udp, saturate, forward, latency, arm, silent, vehicles, memory, resident, logs,
         start, signed, ros2,
     )
 }  # fmt: skip

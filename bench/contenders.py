@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 PEERS: Final = ROOT / "bench" / "peers"
 MAVPROXY, MAVSDK, ROUTER = "MAVProxy", "MAVSDK", "mavlink-routerd"
 COALESCING: Final = "ours, coalesce: 10 ms"
-FILTERED: Final = "ours, kernel filter"
-"""Ours with its filter: the kernel drops datagrams that no status needs. Without it ours reads all frames."""
-NO_FILTER: Final = "--no-kernel-filter"
 LOOP: Final = "Python loop"
 """A loop over `recv` with our parser."""
 ANY: Final = "pymavlink, any type"
@@ -63,10 +60,9 @@ class Contenders:
         """Whether our command has this option."""
         return f"{option} " in self._options or f"{option}]" in self._options
 
-    def start_ours(self, port: int, *arguments: str, pipe: bool = False, filtered: bool = False) -> Child:
-        """Our command, listening. It reads every frame, as the others do, unless it is `filtered`."""
-        whole = [NO_FILTER] if not filtered and self.has_option(NO_FILTER) else []
-        return Child(self.ours(f"udpin:127.0.0.1:{port}", *whole, *arguments), pipe=pipe)
+    def start_ours(self, port: int, *arguments: str, pipe: bool = False) -> Child:
+        """Our command, listening."""
+        return Child(self.ours(f"udpin:127.0.0.1:{port}", *arguments), pipe=pipe)
 
     def start_pymavlink(self, port: int, *arguments: str, pipe: bool = False) -> Child:
         """A loop over `recv_match` that prints JSON lines."""
@@ -78,8 +74,8 @@ class Contenders:
 
     def start(self, who: str, port: int) -> Child:
         """A program that reads UDP, with its default options. Raises Missing."""
-        if who in (OURS, FILTERED):
-            return self.start_ours(port, filtered=who == FILTERED)
+        if who == OURS:
+            return self.start_ours(port)
         if who == COALESCING:
             config = self._place / "coalesce.yaml"
             config.write_text("coalesce: 10 ms\n")
@@ -136,8 +132,6 @@ class Contenders:
                     self.path(name)
                 elif name == MAVSDK:
                     self._mavsdk()
-                elif name == FILTERED and not self.has_option(NO_FILTER):
-                    raise Missing("this version lacks it")
             except Missing as missing:
                 skipped.append(Skip("", name, str(missing)))
             else:

@@ -101,17 +101,14 @@ class Feed:
         self.total += int(sent)
         return int(sent), float(took)
 
-    def measure(self, child: Child, rate: int, seconds: float, burst: int = 1, *, filtered: bool = False) -> Fed:
-        """The CPU time of the child from the first frame until it has read all of them.
-
-        `filtered`: a filter drops frames in the kernel. The kernel counts them as lost; they are not.
-        """
+    def measure(self, child: Child, rate: int, seconds: float, burst: int = 1) -> Fed:
+        """The CPU time of the child from the first frame until it has read all of them."""
         dropped_before, cpu_before = self._dropped(), child.cpu()
         sent, took = self.send(rate, seconds, burst)
         ended = time.perf_counter()
         complete = drained(self._port)
         behind = time.perf_counter() - ended
-        lost = 0 if filtered else self._dropped() - dropped_before
+        lost = self._dropped() - dropped_before
         return Fed(sent, lost if complete else max(lost, 1), took, child.cpu() - cpu_before, rate, behind)
 
     def warm_up(self, rate: int = 800, seconds: float = 1.0) -> None:

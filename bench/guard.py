@@ -172,7 +172,7 @@ COUNTED: Final[dict[str, Callable[[], AbstractContextManager[Work]]]] = {
 def _gateway(clock: Callable[[], Instant]) -> Iterator[tuple[EventLoop, Callable[[bytes], object]]]:
     """A gateway with a manual clock, and a function that sends it a datagram."""
     with open(os.devnull, "w") as nowhere, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        config = Config(links=(LinkConfig("udpin:127.0.0.1:0"),), kernel_filter=False)  # every datagram is a turn
+        config = Config(links=(LinkConfig("udpin:127.0.0.1:0"),))
         gateway = EventLoop(config, nowhere, clock)
         try:
             link: Any = gateway.endpoints[0].link

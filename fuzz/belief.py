@@ -30,7 +30,7 @@ from mav_robot_status.gateway.mavlink_hardware import MavlinkHardware
 from mav_robot_status.interface import LinkState, TriState
 from mav_robot_status.links.base import Received
 from mav_robot_status.mavlink import definitions as mav
-from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.encode import enclose, encode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,6 +50,8 @@ KINDS: Final = (2, 10)  # quadrotor, rover
 STATES: Final = (4, 4, 5, 6, 8)  # ACTIVE, CRITICAL, EMERGENCY, FLIGHT_TERMINATION
 HIL: Final = 32
 """MAV_MODE_FLAG_HIL_ENABLED."""
+RAW_IMU: Final = 27
+"""A message that no status needs."""
 FAR: Final = 60
 """The least distance of the sequence numbers of the two senders."""
 WORLD_STEPS: Final = 500
@@ -132,8 +134,6 @@ class Sender:
 class World:
     """The senders, the air and the gateway. Each step is a method; `check` follows each."""
 
-    air: type[Air] = Air
-
     def __init__(self) -> None:
         self.now = START
         self.history: deque[str] = deque(maxlen=WORLD_STEPS + 1)
@@ -147,7 +147,7 @@ class World:
     def restart(self) -> None:
         """The gateway restarts. It knows nothing of before."""
         self._newest, self._armed_at = -1, -math.inf
-        with mock.patch("mav_robot_status.gateway.endpoint.open_guarded", self.air):
+        with mock.patch("mav_robot_status.gateway.endpoint.open_guarded", Air):
             config = Config(links=(LinkConfig("udpin:127.0.0.1:1"),), requests="none")
             self.hardware = MavlinkHardware(config, lambda: self.now)
         (endpoint,) = self.hardware.hub.endpoints
@@ -175,6 +175,14 @@ class World:
         sender = self.senders[who]
         clock_ms = round((self.now.mono - sender.booted) * 1000)
         self._send(sender, mav.Attitude(clock_ms, 0.0, 0.0, 0.0), fate, None)
+
+    def chatter(self, who: int, count: int) -> None:
+        """A sender sends frames that no status needs. They count in the sequence."""
+        sender = self.senders[who]
+        for _ in range(count):
+            for way in sender.ways[:1] if sender.forked else sender.ways:
+                self._air.waiting.append(Received(_unneeded(self._count(sender, way)), way))
+        self._source.receive(self.now, 64)
 
     def arm(self, who: int, armed: bool) -> None:
         """A sender arms or disarms."""
@@ -273,6 +281,11 @@ def _distance(one: int, other: int) -> int:
 @lru_cache(maxsize=8192)
 def _packed(message: Any, sequence: int) -> bytes:
     return encode(message, system=1, component=1, sequence=sequence)
+
+
+@lru_cache(maxsize=256)
+def _unneeded(sequence: int) -> bytes:
+    return enclose(RAW_IMU, b"imu", system=1, component=1, sequence=sequence)
 
 
 def random_step(world: World, random: Random) -> tuple[str, tuple[Any, ...]]:

@@ -8,13 +8,12 @@ import os
 import select
 import socket
 import time
-from functools import partial
 from statistics import median, quantiles
 from typing import TYPE_CHECKING, Any
 
 from .. import workload
 from ..case import Bench, Case, Found
-from ..contenders import FILTERED, LOOP, NO_FILTER
+from ..contenders import LOOP
 from ..process import BenchError, Child, free_port
 from ..results import FIRST_MACHINE, OURS, PYMAVLINK, Sample, Target
 
@@ -33,7 +32,6 @@ LONGEST = 2.0  # s
 HEARTBEAT = 0
 ARMED: dict[str, Callable[[dict[str, Any]], Any]] = {
     OURS: lambda line: line["drives_powered"],
-    FILTERED: lambda line: line["drives_powered"],
     PYMAVLINK: lambda line: line["armed"],
     LOOP: lambda line: line["armed"],
 }
@@ -43,8 +41,6 @@ def measure(bench: Bench) -> Found:
     """One round."""
     programs = bench.contenders
     starts = {OURS: programs.start_ours, PYMAVLINK: programs.start_pymavlink, LOOP: programs.start_loop}
-    if programs.has_option(NO_FILTER):
-        starts[FILTERED] = partial(programs.start_ours, filtered=True)
     for setup, rate in ((UNLOADED, 0), (LOADED, RATE)):
         for who, start in starts.items():
             port = free_port()

@@ -9,7 +9,6 @@ import shutil
 import socket
 import threading
 from contextlib import ExitStack
-from functools import partial
 from typing import TYPE_CHECKING
 
 from ..case import Bench, Case, Found
@@ -49,7 +48,7 @@ def measure(bench: Bench) -> Found:
 
 def _start(bench: Bench, setup: str, port: int, ended: ExitStack) -> Child | None:
     """One of them; None if the broker that it needs is missing."""
-    ours = partial(bench.contenders.start_ours, filtered=True)  # as users start it
+    ours = bench.contenders.start_ours
     if setup == RUN:
         return ended.enter_context(ours(port))
     if setup == HTTP:

@@ -8,7 +8,6 @@ import sys
 from contextlib import ExitStack
 
 from ..case import Bench, Case, Found
-from ..contenders import NO_FILTER
 from ..feed import Feed
 from ..process import Child, free_port
 from ..results import OURS, Sample, Skip
@@ -58,7 +57,7 @@ def _gateway(bench: Bench, setup: str, publishers: str) -> Found:
         f"  publishers: {publishers}\n"
     )
     port = free_port()
-    command = bench.contenders.ours(f"udpin:127.0.0.1:{port}", NO_FILTER, "--passive", "--config", str(config))
+    command = bench.contenders.ours(f"udpin:127.0.0.1:{port}", "--passive", "--config", str(config))
     env = {**os.environ, "CYCLONEDDS_URI": LOOPBACK}
     with Child(command, env=env) as child, Feed(bench.frames(), port) as feed:
         child.listens(port)

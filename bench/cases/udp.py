@@ -1,4 +1,4 @@
-"""UDP to status at steady rates, one frame a datagram. Ours reads every frame, and once its kernel filter is on."""
+"""UDP to status at steady rates, one frame a datagram."""
 
 from __future__ import annotations
 
@@ -6,17 +6,15 @@ import re
 from typing import NamedTuple
 
 from ..case import Bench, Case, Found
-from ..contenders import ANY, COALESCING, FILTERED, LOOP, MAVPROXY, MAVSDK, ROUTER
+from ..contenders import ANY, COALESCING, LOOP, MAVPROXY, MAVSDK, ROUTER
 from ..feed import Feed
 from ..process import BenchError, free_port
 from ..results import OURS, PYMAVLINK, Sample, Skip, Target
 from ..workload import HALF, QUARTER, WORKLOADS, Workload
 
-EVERYONE = (OURS, FILTERED, COALESCING, LOOP, PYMAVLINK, ANY, MAVSDK, ROUTER, MAVPROXY)
+EVERYONE = (OURS, COALESCING, LOOP, PYMAVLINK, ANY, MAVSDK, ROUTER, MAVPROXY)
 METRIC = "CPU per frame, us"
 READ = "frames read, by its own count, %"
-BEGINS = 2.0
-"""Seconds of traffic after which our filter is on."""
 SECONDS = {80: 10.0, 800: 5.0, 8000: 4.0}
 BURST = 8
 """Frames that an autopilot sends at once: at 80 frames/s one burst every 100 ms."""
@@ -55,12 +53,9 @@ def _one(bench: Bench, who: str, traffic: Workload, spacings: tuple[Spacing, ...
     with bench.contenders.start(who, port) as child, Feed(bench.frames(traffic=traffic), port) as feed:
         child.listens(port)
         feed.warm_up(seconds=bench.lasting(1.0))
-        filtered = who == FILTERED
-        if filtered:
-            feed.send(EVENLY[0].rate, BEGINS)
         for spacing in spacings:
             seconds = bench.lasting(SECONDS[spacing.rate])
-            fed = feed.measure(child, spacing.rate, seconds, spacing.burst, filtered=filtered)
+            fed = feed.measure(child, spacing.rate, seconds, spacing.burst)
             yield Sample(spacing.setup(traffic), METRIC, who, fed.per_frame, fed.note)
         if who in (OURS, COALESCING):
             found = _logged_frames(child.stop())
@@ -88,10 +83,6 @@ def _targets(spacing: Spacing, traffic: Workload) -> tuple[Target, ...]:
         )  # fmt: skip
     return (
         Target(setup, METRIC, f"{words}: at most MAVSDK's CPU", 1.0, peer=MAVSDK),
-        Target(
-            setup, METRIC, f"{words}, with the kernel filter: at most 0.7 of MAVSDK's CPU", 0.7,
-            peer=MAVSDK, who=FILTERED,
-        ),
         Target(setup, METRIC, f"{words}: at most 1.3 of a Python loop's CPU", 1.3, peer=LOOP),
     )  # fmt: skip
 

@@ -20,10 +20,9 @@ def run(options: argparse.Namespace) -> int:
     """Print what the configuration means. Raises ConfigError, which names the place of an error, or UsageError."""
     from ..gateway.controller_config import check
     from ..gateway.event_table_file import event_table
-    from ..gateway.kernel_filter import words
 
     config = load(options.file)
     check(config)
     event_table(config)
-    say(*describe(config), *words(config))
+    say(*describe(config))
     return 0

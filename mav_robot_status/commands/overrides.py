@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 from argparse import Namespace
 from collections.abc import Sequence
 from typing import Final
 
 from ..config import Config, ControllerConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
 from ..config import load as load_config
+from ..config.model import NO_EFFECT
 from ..errors import UsageError
 from ..interface import DEFAULT_HANDLE_NAME
 from ..links.url import parse
@@ -17,13 +19,21 @@ from . import PROGRAM
 from .arms import with_arms
 from .options import WITH_ARGUMENTS, given, options_of, value_of
 
+log = logging.getLogger(__name__)
+
 BESIDE_MAVLINK: Final = ("run", "watch", "explain", "doctor")
 """Commands that need no connection if the configuration has a hardware interface other than MAVLink."""
 
 
 def loaded(options: Namespace) -> Config:
-    """The configuration of the file, or the default one, with names and PX4's table of events. Raises ConfigError."""
+    """The configuration of the file, or the default one, with names and PX4's table of events. Raises ConfigError.
+
+    The log names what has no effect any more.
+    """
     config = load_config(options.config) if options.config else Config()
+    old = [NO_EFFECT["kernel_filter"].format("--no-kernel-filter")] if value_of(options, "--no-kernel-filter") else []
+    for line in (*config.without_effect, *old):
+        log.warning("%s", line)
     if names := value_of(options, "--name"):
         config = dataclasses.replace(config, names={**config.names, **_once(names)})
     table = value_of(options, "--px4-events")
@@ -70,7 +80,6 @@ def overridden(config: Config, options: Namespace) -> Config:
         record=config.record if record is None else record,
         max_gap=config.max_gap if max_gap is None else max_gap,
         forward=config.forward or bool(value_of(options, "--forward")),
-        kernel_filter=False if value_of(options, "--no-kernel-filter") else config.kernel_filter,
     )
 
 

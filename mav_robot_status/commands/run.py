@@ -48,7 +48,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     arms(parser)
     parser.add_argument("--forward", action="store_true", help="forward every frame between the links and the outs")
     parser.add_argument("--passive", action="store_true", help="never send on the vehicle links")
-    parser.add_argument("--no-kernel-filter", action="store_true", help="read every datagram, and count lost frames")
+    parser.add_argument("--no-kernel-filter", action="store_true", help="has no effect any more; remove it")
     parser.add_argument("--raw", action="store_true", help="the log is a raw capture of MAVLink, without time stamps")
     parser.add_argument(
         "--max-gap", type=gap, metavar="S", help="once the link is lost, a longer silence in a log is one line (60)"

@@ -33,6 +33,7 @@ def describe(config: Config) -> list[str]:
         *([f"record: everything received and sent, to {config.record}"] if config.record else []),
         *(f"controller {controller.name}: {_controller(controller)}" for controller in config.controllers),
         *([] if config.controllers else ["controller: the default one for each handle"]),
+        *config.without_effect,
     ]
 
 

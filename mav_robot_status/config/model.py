@@ -136,6 +136,12 @@ class GroupConfig:
     """The rules that differ from `hardware.group.RULES`."""
 
 
+NO_EFFECT: Final = {
+    "kernel_filter": "{} has no effect any more: every frame is read, so lost frames are always counted; remove it",
+}
+"""The keys of former versions that are still accepted, for one release. `{}`: the key, or the option in its place."""
+
+
 @dataclass(frozen=True, slots=True)
 class Config:
     """A whole configuration. As created it has the defaults."""
@@ -161,9 +167,6 @@ class Config:
     """None: nothing is signed or verified."""
     coalesce: Annotated[float, Within(0.0, 1.0, "s")] = 0.0
     """Seconds to wait for more input before reading: fewer wake-ups if several frames come within it, more delay."""
-    kernel_filter: Annotated[bool | None, Or("auto")] = None
-    """Whether the kernel drops datagrams that no status needs, on UDP links whose frames nobody else needs. None: yes,
-    unless a publisher can show how many frames were lost."""
     max_gap: Annotated[float, Within(0.0, 86400.0, "s")] = 60.0
     """After the link is lost, a silence of a recorded log that is longer than this gives one line."""
     forward: bool = False
@@ -172,6 +175,8 @@ class Config:
     """The .tlog file for all frames received and sent."""
     controllers: tuple[ControllerConfig, ...] = ()
     """Empty: the default controller."""
+    without_effect: tuple[str, ...] = ()
+    """A line for each key that is written and has no effect any more: where, why, and what to do."""
 
     @property
     def hears_mavlink(self) -> bool:

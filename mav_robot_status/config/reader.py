@@ -13,7 +13,7 @@ from ..links import url
 from ..links.tlog_file import check_name
 from ..mavlink.component import GROUND_STATION
 from .document import Node, load_document, quoted
-from .model import Config, ControllerConfig, HardwareConfig, NameConfig, PublisherConfig, VehicleConfig
+from .model import NO_EFFECT, Config, ControllerConfig, HardwareConfig, NameConfig, PublisherConfig, VehicleConfig
 from .values import did_you_mean, entries, read
 
 OUR_TYPES: Final = (
@@ -43,12 +43,19 @@ def load(path: str | os.PathLike[str]) -> Config:
 def build(document: Node) -> Config:
     """The configuration that a file holds. Raises ConfigError."""
     sections = get_type_hints(Config, include_extras=True)
-    del sections["controllers"], sections["interfaces"], sections["names"]
-    given, interfaces = _hardware(entries(document))
+    del sections["controllers"], sections["interfaces"], sections["names"], sections["without_effect"]
+    given, without_effect = _without_effect(entries(document))
+    given, interfaces = _hardware(given)
     given, names = _names(given)
     read_sections = {key: read(sections[key], node) for key, node in given.items() if key in sections}
     stanzas = [_controller(key, node, sections) for key, node in given.items() if key not in sections]
-    config = Config(**read_sections, names=names, interfaces=interfaces, controllers=tuple(stanzas))
+    config = Config(
+        **read_sections,
+        names=names,
+        interfaces=interfaces,
+        controllers=tuple(stanzas),
+        without_effect=without_effect,
+    )
     _check_hysteresis(config, given)
     _check_outs(config, given)
     _check_record(config.record, given)
@@ -57,6 +64,13 @@ def build(document: Node) -> Config:
     _check_handles(config, given)
     _check_groups(config, given)
     return config
+
+
+def _without_effect(given: dict[str, Node]) -> tuple[dict[str, Node], tuple[str, ...]]:
+    """Split the keys that have no effect any more. Their values are not checked."""
+    old = {key: node for key, node in given.items() if key in NO_EFFECT}
+    lines = tuple(f"{(node.key or node).at}: {NO_EFFECT[key].format(key)}" for key, node in old.items())
+    return {key: node for key, node in given.items() if key not in old}, lines
 
 
 def _hardware(given: dict[str, Node]) -> tuple[dict[str, Node], tuple[HardwareConfig, ...]]:

@@ -15,7 +15,6 @@ from ..links.udp import UdpSender
 from ..links.url import parse
 from ..mavlink.counters import Counters
 from ..mavlink.framing import Parser
-from .kernel_filter import KernelFilter
 from .speech import LIMIT, Speech
 
 if TYPE_CHECKING:
@@ -98,7 +97,6 @@ class Channel:
         """Start or stop using messages that bring files. May be repeated: the channel may have another parser now."""
         self.wanted = IDS_WITH_FILES if on else WANTED_IDS
         self.parser.want(self.wanted)
-        self.endpoint.filter.widen(self.wanted)
 
     def gives_way(self, now: float) -> bool:
         """Whether it gives up its place to another, because no vehicle speaks on it."""
@@ -118,19 +116,8 @@ class Channel:
 class Endpoint:
     """One link with its channels. Bounded for any number of senders."""
 
-    def __init__(
-        self,
-        config: LinkConfig,
-        is_out: bool = False,
-        number: int = 0,
-        *,
-        keep_all: bool = False,
-        filters: bool = False,
-    ) -> None:
-        """Open the link. Raises LinkError, UsageError.
-
-        `keep_all`: parse every frame, to forward or record it. `filters`: the kernel may drop what no status needs.
-        """
+    def __init__(self, config: LinkConfig, is_out: bool = False, number: int = 0, *, keep_all: bool = False) -> None:
+        """Open the link. `keep_all`: parse every frame, to forward or record it. Raises LinkError, UsageError."""
         url = parse(config.url)
         self.url = config.url
         """As in the configuration."""
@@ -153,8 +140,7 @@ class Endpoint:
         self._stranger: Address = None
         """The address whose bytes `_scratch` has."""
         self.is_out = is_out
-        self.filter = KernelFilter(self.link)
-        self.adjust(config, number, keep_all=keep_all, filters=filters)
+        self.adjust(config, number, keep_all=keep_all)
         self.must_speak = url.kind.speaks_first
         self.listens = url.kind.listens
         """Whether each source address is a peer. Otherwise the link has one peer, whatever the address."""
@@ -168,9 +154,8 @@ class Endpoint:
         if not self.listens:
             self._only = self._channels[None] = Channel(self, None, Parser(self._wanted))
 
-    def adjust(self, config: LinkConfig, number: int, *, keep_all: bool = False, filters: bool = False) -> None:
+    def adjust(self, config: LinkConfig, number: int, *, keep_all: bool = False) -> None:
         """Change an open link: everything except its URL."""
-        self.filter.allow(filters and not keep_all)
         self.number, self.passive = number, config.passive
         self.heartbeat_timeout = config.heartbeat_timeout
         self.robot_status = not self.is_serial if config.robot_status is None else config.robot_status
@@ -217,7 +202,7 @@ class Endpoint:
         """A channel for an address that speaks MAVLink. It gets the parser of its first bytes."""
         self._stranger = None
         if self._asks is not None:
-            if not self._asks.may_answer(source, self._source, self._silence(now)):
+            if not self._asks.may_answer(source, self._source, now - self._source_at):
                 return None
             self._asks.answered(source)
             self._source, self._source_at = source, now
@@ -232,10 +217,6 @@ class Endpoint:
         channel = self._channels[source] = Channel(self, source, self._scratch)
         self._scratch = spare or Parser(self._wanted)
         return channel
-
-    def _silence(self, now: float) -> float:
-        """Seconds for which the one peer is silent."""
-        return math.inf if self._source is None else self.filter.silence(self._source_at, now)
 
     def heard(self, channel: Channel, now: float) -> bool:
         """Note a heartbeat. On a listening link the channel becomes a peer, up to MOST_PEERS. True if it is new.
@@ -281,27 +262,6 @@ class Endpoint:
                 if self.listens:
                     channel.is_peer, channel.interval = False, None
 
-    def review_filter(self, now: float, *, heard: bool) -> None:
-        """Begin or end the filter in the kernel. Called once a second; `heard`: a vehicle was heard here lately."""
-        channels = self._channels.values()
-        wanted = WANTED_IDS.union(*(channel.wanted for channel in channels))
-        heard = heard or (self.is_out and any(now - channel.heard_at <= ACTIVE for channel in channels))
-        if self.filter.review(now, wanted, heard=heard, cut=any(channel.parser.pending for channel in channels)):
-            for channel in channels:
-                channel.parser = _renewed(channel.parser, None if self._wanted is None else channel.wanted)
-                channel.parser.counters.lost = 0
-            self._scratch = Parser(self._wanted)
-
-    @property
-    def lost(self) -> int | None:
-        """Gaps in the sequence numbers; None: not counted, because the kernel filters."""
-        return self.totals().lost if self.filter.counts else None
-
-    @property
-    def dropped(self) -> int | None:
-        """What the link counts as dropped; None: not known, because the kernel filters."""
-        return self.link.dropped if self.filter.counts else None
-
     def totals(self) -> Counters:
         """The counters of all channels, added up."""
         total = Counters()
@@ -328,15 +288,15 @@ class Endpoint:
         """Log the totals of this link."""
         got = self.totals()
         log.info(
-            "%s: %d frames, %s, %d with a bad CRC, %d with an unknown id, %d bytes of garbage, "
-            "%s; sent %d bytes unasked, %d messages held back",
+            "%s: %d frames, %d lost, %d with a bad CRC, %d with an unknown id, %d bytes of garbage, "
+            "%d datagrams dropped; sent %d bytes unasked, %d messages held back",
             self.link.text,
             got.frames,
-            "lost ones not counted" if self.lost is None else f"{self.lost} lost",
+            got.lost,
             sum(got.bad_crc.values()),
             sum(got.unknown.values()),
             got.garbage_bytes,
-            "dropped datagrams not counted" if self.dropped is None else f"{self.dropped} datagrams dropped",
+            self.link.dropped,
             self.speech.said,
             self.speech.withheld,
         )

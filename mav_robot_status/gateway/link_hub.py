@@ -16,8 +16,7 @@ from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
 from ..mavlink.framing import Frame
 from ..mavlink.signing import ACCEPTED, Verdict
 from .arrival import BATCH, USUAL, Arrivals, Pause
-from .endpoint import ACTIVE, Endpoint
-from .kernel_filter import why_not
+from .endpoint import Endpoint
 from .routing import Router
 from .sender import Sender, speaks_for
 from .signing_policy import proof
@@ -102,7 +101,6 @@ class LinkHub:
         before, self.config = self.config, config
         self.offered = frozenset({HEARTBEAT} if config.identity.heartbeat else ())
         self._keep_all = config.forward or config.record is not None
-        filters = why_not(config, observed=bool(self._observers)) is None
         places = [*((link, False) for link in config.links), *((out, True) for out in config.outs)]
         rest = list(self.endpoints)
         kept = [_take_out(rest, link.url, is_out) for link, is_out in places]
@@ -116,9 +114,9 @@ class LinkHub:
             enumerate(zip(places, kept, strict=True)), key=lambda row: not row[1][0][1]
         ):
             if endpoint is not None:
-                endpoint.adjust(link, number, keep_all=self._keep_all, filters=filters)
+                endpoint.adjust(link, number, keep_all=self._keep_all)
                 continue
-            endpoint = Endpoint(link, is_out, number, keep_all=self._keep_all, filters=filters)
+            endpoint = Endpoint(link, is_out, number, keep_all=self._keep_all)
             self.endpoints.append(endpoint)
             opened.append(endpoint)
         self.endpoints.sort(key=lambda endpoint: endpoint.number)
@@ -420,10 +418,8 @@ class LinkHub:
 
     def speak(self, vehicles: Sequence[TrackedVehicle], now: float) -> None:
         """Send our heartbeats, and what waited for its turn. Called once a second."""
-        heard = self._heard_lately(now)
         for endpoint in self.endpoints:
             endpoint.forget_silent(now)
-            endpoint.review_filter(now, heard=endpoint in heard)
             for channel in endpoint.channels():
                 channel.systems.clear()
                 channel.quiet = False
@@ -436,12 +432,6 @@ class LinkHub:
                 else:
                     path.systems.add(tracked.ids[0])
         self.sender.speak(self.endpoints, vehicles, self.config.identity.heartbeat)
-
-    def _heard_lately(self, now: float) -> set[Endpoint]:
-        """The links on which heartbeats of vehicles arrive, also those that are only claims."""
-        claims = [claim for one in self.claims.values() for claim in (one.mine, *one.others.values())]
-        ways = {claim.way for claim in claims if claim is not None and now - claim.at <= ACTIVE}
-        return {way.endpoint for way in ways if way is not None}
 
     def ask(self, request: Ask) -> None:
         """Send a request to a vehicle."""

@@ -23,8 +23,8 @@ class ConnectionMetrics(NamedTuple):
     """Peers that get messages from us."""
     frames: int
     """Valid MAVLink frames that reached the gateway."""
-    lost: int | None
-    """Sequence numbers that are missing; None: not counted, because the kernel filters."""
+    lost: int
+    """Sequence numbers that are missing."""
     crc_errors: Mapping[int, int]
     """Frames with a bad CRC by message id. -1 counts the ids beyond the limit."""
     unknown: int
@@ -32,8 +32,8 @@ class ConnectionMetrics(NamedTuple):
     incompatible: int
     """Frames with an unknown incompatibility flag."""
     garbage_bytes: int
-    dropped: int | None
-    """Messages that could not be sent, and datagrams that the kernel dropped; None: not known, because it filters."""
+    dropped: int
+    """Messages that could not be sent, and datagrams that the kernel dropped."""
     said: int = 0
     """Bytes that we sent without being asked."""
     withheld: int = 0

@@ -86,14 +86,3 @@ class DatedLink(Protocol):
 
     def receive_dated(self, limit: int = 64) -> list[Dated]:
         """As `receive`, with stamps. It takes longer, so it is called only if input may be old."""
-
-
-@runtime_checkable
-class FilteredLink(Protocol):
-    """What a link of datagrams can offer besides `Link`: unneeded ones do not reach the process."""
-
-    def filter(self, program: bytes | None) -> bool:
-        """Drop the datagrams that this program rejects, before they are received; None: no longer.
-
-        False if the link cannot: then nothing changes.
-        """

@@ -9,8 +9,6 @@ import os
 import random
 import socket
 import struct
-import sys
-from array import array
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -45,9 +43,6 @@ _CONTROL = socket.CMSG_SPACE(_TIMESPEC.size)
 _SO_RCVBUFFORCE = 33  # Linux; Python has no names for these
 _SO_MEMINFO = 55
 _MEMINFO = struct.Struct("9I")  # the last word counts the datagrams that the kernel dropped
-_SO_ATTACH_FILTER, _SO_DETACH_FILTER = 26, 27
-_FPROG = struct.Struct("@HP")  # struct sock_fprog: the number of instructions, and where they are
-_INSTRUCTION = 8  # bytes
 
 _UNREACHABLE = dict.fromkeys((errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN, errno.ENODEV, errno.EPERM), "")
 """Send errors that persist until a person acts, with a text where the system's text is not clear. All other errors,
@@ -65,8 +60,7 @@ class UdpLink:
 
     def __init__(self, url: Url, fraction: RandomFraction = random.random) -> None:
         self.text = url.words()
-        self._unsent = self._overflowed = self._rejected = 0
-        self._filters = False
+        self._unsent = self._overflowed = 0
         self._socket: socket.socket | None = None
         self._peer: SocketAddress | None = None
         self._unreachable: dict[SocketAddress, str] = {}
@@ -85,44 +79,12 @@ class UdpLink:
 
     @property
     def dropped(self) -> int:
-        """How many sends failed, plus how many datagrams the kernel dropped because the receive buffer was full.
-
-        The kernel counts what a filter rejects as dropped too. So nothing is counted while there is a filter.
-        """
-        if not self._filters and (count := self._kernel_count()) is not None:
-            self._overflowed = (count - self._rejected) & 0xFFFFFFFF
-        return self._unsent + self._overflowed
-
-    def filter(self, program: bytes | None) -> bool:
-        """Let the kernel drop the datagrams that a classic BPF program rejects; None: no longer.
-
-        The program sees each datagram from its UDP header on. What waits in the socket already is read as before. False
-        if the link has no socket, or the system no such filter: then nothing changes.
-        """
-        if self._socket is None or sys.platform != "linux":
-            return False
-        counted = self.dropped
-        try:
-            if program is None:
-                self._socket.setsockopt(socket.SOL_SOCKET, _SO_DETACH_FILTER, 0)
-            else:
-                code = array("B", program)
-                fprog = _FPROG.pack(len(code) // _INSTRUCTION, code.buffer_info()[0])
-                self._socket.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, fprog)
-        except OSError:  # an older or another kernel, or a sandbox
-            return False
-        self._filters = program is not None
-        if program is None and (count := self._kernel_count()) is not None:
-            self._rejected = count - (counted - self._unsent)
-        return True
-
-    def _kernel_count(self) -> int | None:
-        """How many datagrams the kernel has dropped, for whatever reason; None: it does not tell."""
+        """How many sends failed, plus how many datagrams the kernel dropped because the receive buffer was full."""
         if self._socket is not None:
             with suppress(OSError, struct.error):  # closed, or the kernel does not support this
                 meminfo = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size)
-                return int(_MEMINFO.unpack(meminfo)[-1])
-        return None
+                self._overflowed = int(_MEMINFO.unpack(meminfo)[-1])
+        return self._unsent + self._overflowed
 
     def receive(self, limit: int = 64) -> list[Received]:
         """The datagrams that wait, at most `limit`; `source` is the socket address of the sender."""

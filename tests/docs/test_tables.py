@@ -36,6 +36,8 @@ from .documents import DOCUMENTS, ROOT, blocks, links, name_of, prose, table
 WHOLE = ("gateway", "views", "hardware", "publishers", "interface")
 """Folders whose every part is in the picture of the architecture page."""
 OTHER_TOOLS = {"--dialect", "--check", "--reference"}  # options of MAVProxy, ruff and chown
+NO_KEYS = ("controllers", "interfaces", "names", "without_effect")
+"""Fields of a configuration that are no keys: other keys at the top, parts of two lists, keys of former versions."""
 
 
 @pytest.mark.parametrize(
@@ -54,7 +56,7 @@ def test_the_keys_of_a_section_with_defaults_and_units(heading: str, kind: Any) 
     expected = [
         [field.name, _default(field, get_args(hints[field.name])), _unit(get_args(hints[field.name]))]
         for field in dataclasses.fields(kind)
-        if field.name not in ("controllers", "interfaces", "names")  # other keys at the top; parts of two lists
+        if field.name not in NO_KEYS
     ]
     assert [row[:3] for row in table("docs/reference/configuration.md", "key", heading)] == expected
 

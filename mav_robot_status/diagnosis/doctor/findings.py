@@ -186,8 +186,6 @@ class Findings:
     """Frames with a good CRC by id."""
     dropped: int = 0
     """Messages that could not be sent, and datagrams that the kernel dropped."""
-    kernel_filter: bool | None = None
-    """Whether a gateway with this configuration filters this link in the kernel. None: not a UDP link."""
     sources: tuple[str, ...] = ()
     """Source addresses, on links that can have several peers."""
     speakers: tuple[Speaker, ...] = ()

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Final
 from ...clock import now as present
 from ...errors import LinkError
 from ...gateway.event_loop import EventLoop
-from ...gateway.kernel_filter import why_not
 from ...gateway.recorded_log import Recording
 from ...gateway.replay import ReplayPipeline, run_through
 from ...hardware.mavlink.autopilots.wanted import COMMON
@@ -54,7 +53,6 @@ def examine(
     config: Config, link: LinkConfig, seconds: float = LISTEN, clock: Callable[[], Instant] = present
 ) -> tuple[Findings, Diagnosis]:
     """Listen on one of the links. Raises UsageError for a log that cannot be read."""
-    filters = why_not(config) is None
     config = dataclasses.replace(silent(config), links=(link,), outs=(), interfaces=(), record=None, forward=False)
     url = parse(link.url)
     base = Findings(
@@ -63,7 +61,6 @@ def examine(
         link.passive,
         signing=config.signing is not None,
         expected=tuple(v.system for v in config.vehicles if v.system is not None),
-        kernel_filter=filters if url.kind.transport == "udp" else None,
     )
     findings = _read(config, base) if url.kind.is_log else _listen(config, base, seconds, clock)
     return findings, diagnose(findings)

@@ -57,7 +57,6 @@ def as_json(f: Findings, diagnosis: Diagnosis) -> str:
             "incompatible": c.incompatible,
             "garbage_bytes": c.garbage_bytes,
             "dropped": f.dropped,
-            "kernel_filter": f.kernel_filter,
             "sources": f.sources,
             "speakers": [_speaker(s) for s in f.speakers],
         }
@@ -94,8 +93,6 @@ def _traffic(f: Findings) -> Iterator[str]:
         yield f"{c.garbage_bytes} bytes between the frames are not MAVLink"
     if c.incompatible:
         yield f"{c.incompatible} frames have unknown flags"
-    if f.kernel_filter:
-        yield "a gateway filters here in the kernel and does not count lost frames: kernel_filter"
 
 
 def _vehicle(s: Speaker) -> Iterator[str]:

@@ -14,7 +14,7 @@ import pytest
 from bench import workload
 from bench.__main__ import CASES, main
 from bench.case import Bench, Case
-from bench.contenders import FILTERED, Contenders, version_of
+from bench.contenders import ROUTER, Contenders, version_of
 from bench.feed import Feed
 from bench.process import BenchError, Child, drained, free_port, queue
 from bench.report import BEGIN, END, into, render
@@ -93,16 +93,11 @@ def only_tiny(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bench.cases.parse.speed", lambda _: 10 * FIRST_MACHINE)
 
 
-@pytest.mark.parametrize(("known", "measured"), [(True, [OURS, FILTERED]), (False, [OURS])])
-def test_the_kernel_filter_is_skipped_by_name_if_this_version_lacks_it(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, known: bool, measured: list[str]
-) -> None:
-    with closing(Contenders(tmp_path, {})) as contenders:
-        monkeypatch.setattr(contenders, "has_option", lambda _: known)
+def test_a_program_that_is_not_installed_is_skipped_by_name(tmp_path: pathlib.Path) -> None:
+    with closing(Contenders(tmp_path, {ROUTER: "no-such-program"})) as contenders:
         skipped: list[Skip] = []
-        assert list(contenders.each([OURS, FILTERED], skipped)) == measured
-    lacks = Skip("", FILTERED, "this version lacks it")
-    assert skipped == ([] if known else [lacks])
+        assert list(contenders.each([OURS, ROUTER], skipped)) == [OURS]
+    assert skipped == [Skip("", ROUTER, "the program no-such-program is not installed")]
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,17 @@ def test_it_describes_a_configuration(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "listening on 127.0.0.1:14550/udp" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("value", ["auto", "true", "false", "never"])
+def test_it_says_that_a_key_has_no_effect_any_more(
+    value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "c.yaml"
+    config.write_text(f"kernel_filter: {value}\n")
+    assert run(said("check-config", str(config))) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "kernel_filter" in line)
+    assert line.startswith(f"{config}:1:1: kernel_filter has no effect any more: ")
+
+
 @pytest.mark.parametrize(
     ("publisher", "fault"),
     [

@@ -23,6 +23,22 @@ def run(*arguments: str) -> argparse.Namespace:
     return said("run", *arguments)
 
 
+OLD = "has no effect any more: every frame is read, so lost frames are always counted; remove it"
+
+
+def test_the_kernel_filter_is_accepted_with_a_warning_and_without_effect(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = tmp_path / "c.yaml"
+    file.write_text("links: [udp:127.0.0.1:1]\nkernel_filter: auto\n")
+    config = configured(run("--config", str(file)))
+    assert config.links == (LinkConfig("udp:127.0.0.1:1"),)
+    assert caplog.messages == [f"{file}:2:1: kernel_filter {OLD}"]
+    caplog.clear()
+    assert configured(run("udp:127.0.0.1:1", "--no-kernel-filter")) == configured(run("udp:127.0.0.1:1"))
+    assert caplog.messages == [f"--no-kernel-filter {OLD}"]
+
+
 def test_without_options_the_configuration_stays_as_it_is() -> None:
     config = Config(links=(LinkConfig("udp:127.0.0.1:1"),), controllers=(SLOW,))
     assert overridden(config, run()) == config

@@ -23,12 +23,10 @@ SENT_AS = st.sampled_from(sorted(set(FATES)))
 class TwoSenders(RuleBasedStateMachine):
     """The steps of `World`; its oracle is the invariant."""
 
-    world_type = World
-
     @initialize()
     def begin(self) -> None:
         logging.disable(logging.WARNING)
-        self.world = self.world_type()
+        self.world = World()
 
     @rule(seconds=st.sampled_from(PAUSES))
     def wait(self, seconds: float) -> None:
@@ -41,6 +39,10 @@ class TwoSenders(RuleBasedStateMachine):
     @rule(who=SENDERS, fate=SENT_AS)
     def stream(self, who: int, fate: str) -> None:
         self.world.stream(who, fate)
+
+    @rule(who=SENDERS, count=st.integers(1, 60))
+    def chatter(self, who: int, count: int) -> None:
+        self.world.chatter(who, count)
 
     @rule(who=SENDERS, armed=st.booleans())
     def arm(self, who: int, armed: bool) -> None:

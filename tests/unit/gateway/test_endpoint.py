@@ -10,7 +10,7 @@ import pytest
 from mav_robot_status.config import LinkConfig
 from mav_robot_status.gateway.endpoint import MOST_PEERS, MOST_SOURCES, PEER_SILENCE, Channel, Endpoint
 from mav_robot_status.mavlink.definitions import Heartbeat, NamedValueInt
-from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.encode import enclose, encode
 
 HEARTBEAT = encode(Heartbeat(0, 10, 3, 65, 4, 3), system=1, component=1, sequence=0)
 
@@ -167,6 +167,15 @@ def test_after_an_answer_only_its_address_counts_until_it_is_silent(peer: socket
         assert out.hear_stranger(HEARTBEAT, router, 5.0)[0] is only
 
 
+def test_the_address_that_answers_keeps_its_place_while_it_sends_anything(peer: socket.socket) -> None:
+    port = peer.getsockname()[1]
+    out = Endpoint(LinkConfig(f"udpout:127.0.0.1:{port}"))
+    with contextlib.closing(out.link):
+        only = admitted(out, ("127.0.0.1", port))
+        assert out.channel(("127.0.0.1", port), 5.0) is only
+        assert out.hear_stranger(HEARTBEAT, ("10.9.9.9", 5), 6.0) == (None, [])
+
+
 def test_a_new_connection_does_not_continue_a_frame_of_the_previous_one() -> None:
     with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as server:
         out = Endpoint(LinkConfig(f"tcp:127.0.0.1:{server.getsockname()[1]}"))
@@ -186,6 +195,17 @@ def test_a_passive_endpoint_sends_nothing(peer: socket.socket) -> None:
         peer.setblocking(False)
         with pytest.raises(BlockingIOError):
             peer.recv(100)
+
+
+def test_frames_that_are_lost_between_unneeded_ones_are_counted(
+    endpoint: Endpoint, caplog: pytest.LogCaptureFixture
+) -> None:
+    unneeded = [enclose(27, b"imu", system=1, component=1, sequence=number) for number in (1, 2, 5)]
+    admitted(endpoint, "a").parser.feed(b"".join(unneeded))
+    with caplog.at_level("INFO"):
+        endpoint.log_counters()
+    assert ": 4 frames, 2 lost, " in caplog.text
+    assert ", 0 datagrams dropped; " in caplog.text
 
 
 def test_a_link_that_starts_forwarding_keeps_its_counters_and_delivers_every_frame(endpoint: Endpoint) -> None:

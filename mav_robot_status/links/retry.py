@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
+
+from mav_robot_status.paced_log import BURST, PacedLog
 
 JITTER = 0.1
 """The fraction of a wait that is random, so that many clients of one server do not reconnect at the same time."""
@@ -32,11 +35,18 @@ class Backoff:
 
 
 class StateLog:
-    """Logs the state of a link: one line for each change, none for an attempt that ends like the last one."""
+    """Logs the state of a link: one line for each change, none for an attempt that ends like the last one.
 
-    def __init__(self, log: logging.Logger) -> None:
+    A peer can cause changes all the time. So a line may be left out, but never the end of a trouble that was told.
+    """
+
+    def __init__(self, log: logging.Logger, clock: Callable[[], float] = time.monotonic) -> None:
         self._log = log
+        self._clock = clock
+        self._tell = PacedLog(log, *BURST)
         self._last = ""
+        self._is_down = False
+        """Whether the last line told a trouble."""
 
     def up(self, line: str) -> None:
         """The link works."""
@@ -52,6 +62,10 @@ class StateLog:
         self._log_change(logging.WARNING, line, error)
 
     def _log_change(self, level: int, line: str, error: Exception | None = None) -> None:
-        if line != self._last:
-            self._last = line
-            self._log.log(level, "%s", line, exc_info=error)
+        if line == self._last:
+            return
+        ends = self._is_down and level == logging.INFO
+        if ends:
+            self._log.log(level, "%s", line)
+        if ends or self._tell(level, self._clock(), line, error):
+            self._last, self._is_down = line, level != logging.INFO

@@ -6,10 +6,10 @@ import logging
 import select
 import socket
 import struct
-from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
+from ...paced_log import PacedLog
 from ..listener import host_port
 from .requests import RequestReader
 
@@ -75,7 +75,7 @@ class Server:
         self._poll = select.poll()
         self._poll.register(listener, select.POLLIN)
         self._now = 0.0
-        self._tell, self._tell_refused = PacedLog(20, MINUTE), PacedLog(1, MINUTE)
+        self._tell, self._tell_refused = PacedLog(log, 20, MINUTE), PacedLog(log, 1, MINUTE)
 
     def send(self, frame: bytes) -> None:
         """Send a frame to every client, after what waits."""
@@ -155,22 +155,3 @@ class Server:
         self._poll.unregister(client.socket)
         del self._clients[client.socket.fileno()]
         client.socket.close()
-
-
-class PacedLog:
-    """At most `most` lines in `period` seconds. The next line says how many were left out."""
-
-    def __init__(self, most: int, period: float) -> None:
-        self._period = period
-        self._times: deque[float] = deque(maxlen=most)
-        self._left_out = 0
-
-    def __call__(self, level: int, now: float, line: str) -> None:
-        """Log a line at `now` (seconds), if it is not one too many."""
-        times = self._times
-        if len(times) == times.maxlen and now < times[0] + self._period:
-            self._left_out += 1
-            return
-        times.append(now)
-        log.log(level, "%s%s", line, f" ({self._left_out} lines before it were left out)" if self._left_out else "")
-        self._left_out = 0

@@ -33,3 +33,23 @@ def test_a_state_is_logged_when_it_changes(caplog: pytest.LogCaptureFixture) -> 
         ("INFO", "well again", "a link"),
         ("WARNING", "100% broken", "a link"),
     ]
+
+
+def test_a_state_that_changes_all_the_time_is_logged_seldom_and_its_end_always(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO)
+    now = [0.0]
+    state_log = StateLog(logging.getLogger("a link"), lambda: now[0])
+    for _ in range(100):
+        now[0] += 1.0
+        state_log.down("lost")
+        state_log.up("connected")
+    assert len(caplog.messages) == 16
+    assert caplog.messages[-1] == "connected"
+    state_log.down("lost")
+    now[0] += 240.0
+    state_log.down("lost")  # the next attempt
+    assert caplog.messages[-1] == "lost (93 lines before it were left out)"
+    state_log.up("connected")
+    assert caplog.messages[-1] == "connected"

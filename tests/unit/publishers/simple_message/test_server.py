@@ -19,7 +19,6 @@ from mav_robot_status.publishers.simple_message.server import (
     MOST_CLIENTS,
     MOST_WAITING,
     SOCKET_OPTIONS,
-    PacedLog,
     Server,
 )
 
@@ -234,14 +233,6 @@ def test_clients_that_connect_again_and_again_do_not_fill_the_log(ends: Ends, ca
             ends.look_until(client, LATEST)
             client.close()
     assert len(caplog.messages) == 20
-
-
-def test_a_paced_log_counts_what_it_leaves_out(caplog: pytest.LogCaptureFixture) -> None:
-    tell = PacedLog(2, 10.0)
-    with caplog.at_level(logging.INFO):
-        for at in (0.0, 1.0, 2.0, 9.0, 10.0, 11.0, 12.0):
-            tell(logging.INFO, at, f"line {at:g}")
-    assert caplog.messages == ["line 0", "line 1", "line 10 (2 lines before it were left out)", "line 11"]
 
 
 def test_closing_ends_all_connections_and_frees_the_port(ends: Ends) -> None:

@@ -29,7 +29,7 @@ class LinkConfig:
     """A link to a vehicle, or an output."""
 
     url: str
-    """A checked connection string, see `links.url.parse`."""
+    """A checked connection string, see `links.url.parse`; with the addresses of the key `from`."""
     passive: bool = False
     """Nothing is ever sent there."""
     robot_status: Annotated[bool | None, Or("auto")] = None

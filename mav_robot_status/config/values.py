@@ -12,7 +12,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from enum import EnumMeta
-from typing import Annotated, Any, Final, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Literal, cast, get_args, get_origin, get_type_hints
 
 from ..errors import ConfigError, UsageError
 from ..hardware.group import Logic, Rule
@@ -20,11 +20,14 @@ from ..hardware.mavlink.autopilots.mode_names import numbers
 from ..hardware.mavlink.options import CustomMode, ModeOverrides, OneOf, Or, Within
 from ..interface import RobotMode
 from ..links import url
+from ..links.senders import sender
 from .document import Node, quoted, short
 from .model import LONGEST_NAME, LinkConfig, PublisherConfig, VehicleName, is_vehicle_name
 
 MAX_TEXT: Final = 1000
 """Characters of a name or a connection string."""
+FROM: Final = "from"
+"""The key of a link with the addresses that it hears. They become a part of `LinkConfig.url`."""
 _SECONDS: Final = re.compile(r"(\d+(?:\.\d*)?|\.\d+) ?(ms|s)", re.ASCII)
 
 
@@ -155,13 +158,35 @@ def _link(node: Node) -> LinkConfig:
     given = node.value if isinstance(node.value, dict) else {"url": node}
     if "url" not in given:
         raise node.fault(f"{node.name} has no 'url': write a connection like udp:127.0.0.1:14550, or {{url: ...}}")
+    entries(node._replace(value=given), (*get_type_hints(LinkConfig), FROM))
     text = _text(given["url"])
+    _check_url(text, given["url"])
+    plain = {key: value for key, value in given.items() if key != FROM}
+    link: LinkConfig = read_fields(LinkConfig, node._replace(value=plain))
+    return dataclasses.replace(link, url=_with_senders(text, given[FROM])) if FROM in given else link
+
+
+def _check_url(text: str, node: Node) -> None:
     try:
         url.parse(text)
     except UsageError as error:
-        raise given["url"].fault(str(error)) from None
-    link: LinkConfig = read_fields(LinkConfig, node._replace(value=given))
-    return link
+        raise node.fault(str(error)) from None
+
+
+def _with_senders(text: str, node: Node) -> str:
+    """The connection string with the addresses of the list `from`."""
+    if not (senders := _list(tuple[str, ...], node)):
+        raise node.fault("from names nobody: write the addresses that are heard, or remove it")
+    for one, item in zip(senders, cast("list[Node]", node.value), strict=True):
+        try:
+            sender(one)
+        except UsageError as error:
+            raise item.fault(str(error)) from None
+    if "?" in text:
+        raise node.key_fault("the url names its senders already: write them there or here")
+    text = f"{text}?{FROM}={','.join(senders)}"
+    _check_url(text, node)
+    return text
 
 
 def _publisher(node: Node) -> PublisherConfig:

@@ -8,6 +8,7 @@ from typing import NoReturn
 
 from mav_robot_status.errors import UsageError
 from mav_robot_status.links.kind import LinkKind, Url
+from mav_robot_status.links.senders import FORM, family, sender
 
 DEFAULT_BAUD = 57600
 """Bits per second if neither the connection string nor the command line has a rate: what telemetry radios use."""
@@ -22,19 +23,24 @@ DEVICE_BAUD = re.compile(
 FRAME_FORMAT = "8N1"
 """8 data bits, no parity, 1 stop bit: what MAVLink uses on serial lines."""
 _HOST_PORT = re.compile(r"(?:\[([0-9A-Fa-f:.]+(?:%[\w.-]+)?)\]|([\w.-]*)):([0-9]*)", re.ASCII)
+FROM = "?from="
+"""Separates the addresses that a listening link hears from the connection string."""
 _MAVROS = re.compile(r"[^@]*?(?::([0-9]+))?@(.*)", re.DOTALL)
 
 
 def network(kind: LinkKind, text: str, rest: str, baud: int | None = None) -> Url:
-    """HOST:PORT. A listener may omit the host, and the colon: it then listens on every address of this machine."""
+    """HOST:PORT. A listener may omit the host, and the colon: it then listens on every address of this machine.
+
+    `?from=` behind it names the addresses that a listener hears.
+    """
     if "@" in rest:
         _explain_mavros(text, kind, rest)
-    place, question, _ = rest.partition("?")
-    if question:
-        raise UsageError(f"{text!r}: options after '?' belong to another program; write {kind.schemes[0]}:{place}")
+    rest, question, option = rest.partition("?")
+    rest = rest.rstrip("/")
+    senders = _senders(text, kind, rest, option) if question else ()
     if kind.listens and rest.isascii() and rest.isdigit():
         rest = f":{rest}"
-    found = _HOST_PORT.fullmatch(rest.rstrip("/"))
+    found = _HOST_PORT.fullmatch(rest)
     if found is None:
         if rest.count(":") > 1 and "[" not in rest:
             raise UsageError(f"{text!r}: write an IPv6 address in brackets, {kind.schemes[0]}:[::1]:14550")
@@ -45,7 +51,40 @@ def network(kind: LinkKind, text: str, rest: str, baud: int | None = None) -> Ur
         raise UsageError(f"{text!r} has no host; write for example {kind.example}")
     if not port:
         raise UsageError(f"{text!r} has no port; write for example {_with_port(kind, host)}")
-    return Url(kind, host or "0.0.0.0", _port(text, kind, port), "", 0, text)
+    host = host or "0.0.0.0"
+    _check_families(text, host, senders)
+    return Url(kind, host, _port(text, kind, port), "", 0, text, senders)
+
+
+def _senders(text: str, kind: LinkKind, place: str, option: str) -> tuple[str, ...]:
+    """The addresses of `from=10.0.0.5,10.0.0.0/24`."""
+    key, equals, value = option.partition("=")
+    right = f"{kind.schemes[0]}:{place}"
+    if key == "from":
+        refuse_from(text, right, kind)
+        if not equals or not all(entries := value.split(",")):
+            raise UsageError(f"{text!r}: from= names nobody; write {FORM}")
+        try:
+            return tuple(dict.fromkeys(map(sender, entries)))
+        except UsageError as error:
+            raise UsageError(f"{text!r}: {error}") from None
+    if kind.listens and sorted(key.lower()) == sorted("from"):
+        raise UsageError(f"{text!r}: did you mean {right}?from={value} ?")
+    raise UsageError(f"{text!r}: options after '?' belong to another program; write {right}")
+
+
+def refuse_from(text: str, right: str, kind: LinkKind) -> None:
+    """Raise UsageError if only one peer speaks on this kind of link. `right`: the connection string without `from=`."""
+    if not kind.listens:
+        raise UsageError(f"{text!r}: from= is for links on which anybody can speak, udp: and tcpin:; write {right}")
+
+
+def _check_families(text: str, host: str, senders: tuple[str, ...]) -> None:
+    """Raise UsageError for an address that can never speak there. `::` hears IPv4, too."""
+    ours = family(host) if senders and host != "::" else 0
+    for one in senders:
+        if ours and family(one) != ours:
+            raise UsageError(f"{text!r}: {one} is IPv{family(one)}, and {host} hears only IPv{ours}; listen on [::]")
 
 
 def _with_port(kind: LinkKind, host: str) -> str:
@@ -74,6 +113,8 @@ def _explain_mavros(text: str, kind: LinkKind, rest: str) -> NoReturn:
 
 def serial(kind: LinkKind, text: str, rest: str, baud: int | None = None) -> Url:
     """DEVICE, DEVICE,BAUD or DEVICE:BAUD, and `:8N1` behind it. A device that exists under the whole text wins."""
+    if FROM in rest and not os.path.exists(rest):
+        refuse_from(text, text.partition(FROM)[0], kind)
     found = None if os.path.exists(rest) else DEVICE_BAUD.fullmatch(rest)
     device, *rates, frame = found.groups() if found else (rest, None)
     digits = next((rate for rate in rates if rate is not None), None)

@@ -33,10 +33,13 @@ class Url(NamedTuple):
     """Bits per second; 0 unless the kind is serial."""
     text: str
     """The connection string itself."""
+    senders: tuple[str, ...] = ()
+    """The addresses and networks that are heard, of a kind that listens; empty: all."""
 
     def words(self) -> str:
-        """What the link does, for the log: `listening on 127.0.0.1:14550/udp`."""
-        return self.kind.words.format(where=self.where(), device=self.device, baud=self.baud)
+        """What the link does, for the log: `listening on 127.0.0.1:14550/udp, from 10.0.0.5 only`."""
+        trusted = f", from {', '.join(self.senders)} only" if self.senders else ""
+        return self.kind.words.format(where=self.where(), device=self.device, baud=self.baud) + trusted
 
     def where(self) -> str:
         """HOST:PORT, as `host_port` writes it."""

@@ -26,7 +26,7 @@ def _refuse(url: Url) -> NoReturn:
 UDP_LISTENER: Final = LinkKind(
     "udpin",
     ("udp", "udpin", "udpserver"),
-    forms=":P  udp:P  udp:H:P  udpin:H:P  udpserver:H:P  udp://[H]:P  udpin://H:P",
+    forms=":P  udp:P  udp:H:P  udpin:H:P  udpserver:H:P  udp://[H]:P  udpin://H:P  udp:H:P?from=ADDRESS,...",
     words="listening on {where}/udp",
     example="udp:127.0.0.1:14550",
     description="listen on a UDP port",
@@ -75,7 +75,7 @@ TCP_CLIENT: Final = LinkKind(
 TCP_SERVER: Final = LinkKind(
     "tcpin",
     ("tcpin", "tcpserver"),
-    forms="tcpin:P  tcpin:H:P  tcpserver:H:P  tcpin://H:P",
+    forms="tcpin:P  tcpin:H:P  tcpserver:H:P  tcpin://H:P  tcpin:H:P?from=ADDRESS,...",
     words="listening on {where}/tcp",
     example="tcpin:0.0.0.0:5760",
     description="be a TCP server",

@@ -9,15 +9,18 @@ import os
 import random
 import socket
 import struct
+import time
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from mav_robot_status.errors import LinkError
 from mav_robot_status.links.base import Address, Dated, Received
 from mav_robot_status.links.listen import LocalPort
 from mav_robot_status.links.resolve import CHECK_AGAIN, Lookup, Target
 from mav_robot_status.links.retry import Backoff, RandomFraction, StateLog
+from mav_robot_status.links.senders import Senders
 from mav_robot_status.links.url import Url, host_port
+from mav_robot_status.paced_log import BURST, PacedLog
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,6 +54,7 @@ _UNREACHABLE[errno.EACCES] = "that is a broadcast address; write udpbcast: to se
 _MAX_UNREACHABLE = 16
 
 SocketAddress = tuple[Any, ...]
+P = TypeVar("P", Received, Dated)
 
 
 class UdpLink:
@@ -67,6 +71,7 @@ class UdpLink:
         self._due = math.inf
         self._backoff = Backoff(*RETRY, fraction)
         self._state_log = StateLog(log)
+        self._tell_unreachable, self._tell_answers = PacedLog(log, *BURST), PacedLog(log, *BURST)
 
     def fileno(self) -> int:
         """The descriptor of the socket; -1 after `close`, and before the name of the peer is resolved."""
@@ -149,9 +154,12 @@ class UdpLink:
         """Log once that a target is unreachable. Bounded, because there may be a target for every address."""
         if error.errno in _UNREACHABLE:
             why = _UNREACHABLE[error.errno] or os.strerror(error.errno).lower()
-            if self._unreachable.get(target) != why and len(self._unreachable) < _MAX_UNREACHABLE:
+            now = time.monotonic()
+            known = self._unreachable.get(target) == why or len(self._unreachable) >= _MAX_UNREACHABLE
+            if not known and now >= self._tell_unreachable.due:
                 self._unreachable[target] = why
-                log.warning("%s: cannot send to %s: %s", self.text, host_port(*target[:2]), why)
+                line = f"{self.text}: cannot send to {host_port(*target[:2])}: {why}"
+                self._tell_unreachable(logging.WARNING, now, line)
 
     def _log_reachable(self, target: SocketAddress) -> None:
         if self._unreachable.pop(target, None):
@@ -170,7 +178,29 @@ class UdpListener(UdpLink):
         self._local_port = LocalPort(url, _new_socket, socket.SOCK_DGRAM, self._state_log)
         self._socket = self._local_port.bind()
         self.text = self._local_port.text
+        self._senders = Senders(url, "datagram")
         self._due = math.inf if self._socket else -math.inf
+
+    def receive(self, limit: int = 64) -> list[Received]:
+        """The datagrams that wait, without those of other addresses than `from=` names."""
+        pieces = super().receive(limit)
+        return pieces if self._senders.everybody else self._admitted(pieces)
+
+    def receive_dated(self, limit: int = 64) -> list[Dated]:
+        """The same with stamps."""
+        return self._admitted(super().receive_dated(limit))
+
+    def _admitted(self, pieces: list[P]) -> list[P]:
+        return [piece for piece in pieces if self._senders.admits(piece.source[0])]  # type: ignore[index]  # a host and a port
+
+    def due(self) -> float:
+        """When `service` has work."""
+        return min(self._due, self._senders.due())
+
+    def service(self, now: float) -> None:
+        """Try to bind again; log what was refused."""
+        super().service(now)
+        self._senders.service(now, self.text)
 
     def _do_due(self, now: float) -> None:
         self._socket = self._local_port.try_bind()
@@ -204,7 +234,8 @@ class UdpSender(UdpLink):
     def answered(self, source: Address) -> None:
         """Note that this address answered with MAVLink. The log names it if it is not the target."""
         if isinstance(source, tuple) and self._peer is not None and self._nearness(source) < EXACT:
-            log.info("%s: %s answers", self.text, host_port(*source[:2]))
+            line = f"{self.text}: {host_port(*source[:2])} answers"
+            self._tell_answers(logging.INFO, time.monotonic(), line)
 
     def _nearness(self, source: Address) -> int:
         """How much this address has in common with the target: everything (EXACT), the host, or nothing."""

@@ -10,7 +10,7 @@ from typing import NoReturn
 from mav_robot_status.errors import UsageError
 from mav_robot_status.links import kinds
 from mav_robot_status.links.foreign import WORDS, what_it_is
-from mav_robot_status.links.forms import ADDRESS, BARE_HOST_PORT, DEVICE_BAUD
+from mav_robot_status.links.forms import ADDRESS, BARE_HOST_PORT, DEVICE_BAUD, FROM, refuse_from
 from mav_robot_status.links.kind import Url, host_port
 from mav_robot_status.links.kinds import BY_SCHEME, KINDS, LOG, SERIAL, UDP_LISTENER, UDP_SENDER
 
@@ -50,10 +50,11 @@ def parse(text: str, baud: int | None = None) -> Url:
         kind = kinds.installed(scheme) if scheme else None
     if kind is not None:
         return kind.url(text, rest, baud)
-    if _PORT_ALONE.fullmatch(text):
+    place = text.partition("?")[0]
+    if _PORT_ALONE.fullmatch(place):
         return UDP_LISTENER.url(text, text, baud)
-    if BARE_HOST_PORT.fullmatch(text):
-        _doubt_host(text)
+    if BARE_HOST_PORT.fullmatch(place):
+        _doubt_host(place)
         return UDP_SENDER.url(text, text, baud)
     return _refuse(text, scheme)
 
@@ -81,6 +82,8 @@ def _refuse(text: str, scheme: str) -> NoReturn:
     """Raise UsageError for a text that is not a connection string."""
     import difflib  # only for this message
 
+    if FROM in text and not scheme:
+        refuse_from(text, text.partition(FROM)[0], LOG)
     if scheme and (near := difflib.get_close_matches(scheme, kinds.schemes(), 1)):
         written = text[: len(scheme)]
         raise UsageError(f"{text!r}: unknown connection type {written}:; did you mean {near[0]}: ?")

@@ -25,6 +25,7 @@ from mav_robot_status.config import (
 from mav_robot_status.errors import ConfigError
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.interface import RobotMode
+from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.signing import UNSIGNED_IDS
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "config").glob("*.yaml"))
@@ -383,3 +384,28 @@ def test_a_mode_can_be_overridden_by_its_name(tmp_path: Path) -> None:
         "rover": {15: RobotMode.MANUAL, 4: RobotMode.UNKNOWN, 77: RobotMode.AUTO},
         "px4": {4 << 16 | 4 << 24: RobotMode.MANUAL},
     }
+
+
+def test_the_addresses_that_a_link_hears_are_a_list_or_a_part_of_its_url(tmp_path: Path) -> None:
+    many = [f"10.0.{number // 250}.{number % 250}" for number in range(300)]
+    config = loaded(
+        tmp_path,
+        "links:\n"
+        "  - {url: 'udp:0.0.0.0:14550', from: [10.0.0.5, 10.0.0.0/24], passive: true}\n"
+        "  - udp:0.0.0.0:14551?from=10.0.0.5\n"
+        f"  - {{url: udp:14552, from: {many}}}\n"
+        "outs:\n"
+        "  - {url: 'tcpin:[::]:5760', from: ['fe80::1']}\n",
+    )
+    assert [link.url for link in config.links[:2]] == [
+        "udp:0.0.0.0:14550?from=10.0.0.5,10.0.0.0/24",
+        "udp:0.0.0.0:14551?from=10.0.0.5",
+    ]
+    assert config.links[0].passive
+    assert parse(config.links[2].url).senders == tuple(many)
+    lines = describe(config)
+    assert (
+        "link: listening on 0.0.0.0:14550/udp, from 10.0.0.5, 10.0.0.0/24 only (passive: nothing is sent there)"
+        in lines
+    )
+    assert "out: listening on [::]:5760/tcp, from fe80::1 only" in lines

@@ -13,7 +13,7 @@ import pytest
 from mav_robot_status.errors import LinkError
 from mav_robot_status.links import open_link
 from mav_robot_status.links.base import Link, Received
-from mav_robot_status.links.udp import ANSWER_SILENCE, UdpLink, UdpSender
+from mav_robot_status.links.udp import ANSWER_SILENCE, UdpLink, UdpListener, UdpSender
 from mav_robot_status.links.url import parse
 
 from .conftest import Names
@@ -233,6 +233,26 @@ def fixture_crowd() -> Iterator[list[socket.socket]]:
             hearing.bind(("127.255.255.255", one.getsockname()[1]))
             hearing.settimeout(5)
         yield [one, two]
+
+
+def test_a_listener_drops_datagrams_of_other_addresses_and_counts_them(
+    open_: Open, caplog: pytest.LogCaptureFixture
+) -> None:
+    link = open_("udpin:127.0.0.1:0?from=127.0.0.5,127.0.1.0/24")
+    for host in ("127.0.0.6", "127.0.0.5", "127.0.1.77", "127.0.0.7"):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.bind((host, 0))
+            sender.sendto(host.encode(), ("127.0.0.1", link.port))
+    assert isinstance(link, UdpListener)
+    assert [piece.data for piece in link.receive(2)] == [b"127.0.0.5"]
+    assert [piece.data for piece in link.receive_dated()] == [b"127.0.1.77"]
+    assert link.due() == -math.inf
+    link.service(100.0)
+    assert link.due() == math.inf
+    assert caplog.messages == [
+        f"{link.text}: refused 2 datagrams from 127.0.0.7, which is not in from=127.0.0.5,127.0.1.0/24"
+    ]
+    assert link.text == f"listening on 127.0.0.1:{link.port}/udp, from 127.0.0.5, 127.0.1.0/24 only"
 
 
 def test_a_broadcaster_sends_to_all_until_a_peer_answers(

@@ -62,6 +62,26 @@ def test_a_network_form_is_understood(text: str, kind: str, host: str, port: int
 
 
 @pytest.mark.parametrize(
+    ("text", "host", "senders"),
+    [
+        ("udp:0.0.0.0:14550?from=10.0.0.5", "0.0.0.0", ("10.0.0.5",)),
+        ("udpin://0.0.0.0:14550/?from=10.0.0.5,10.0.0.0/24", "0.0.0.0", ("10.0.0.5", "10.0.0.0/24")),
+        ("udp:14550?from=10.0.0.5/32,10.0.0.5", "0.0.0.0", ("10.0.0.5",)),
+        (":14550?from=10.0.0.5", "0.0.0.0", ("10.0.0.5",)),
+        ("udp:[::]:14550?from=10.0.0.5,FE80::1,fe80::/10", "::", ("10.0.0.5", "fe80::1", "fe80::/10")),
+        ("udp:[::]:14550?from=::ffff:10.0.0.5", "::", ("10.0.0.5",)),
+        ("udp:rover.local:14550?from=10.0.0.5", "rover.local", ("10.0.0.5",)),
+        ("tcpin:14550?from=10.0.0.5", "0.0.0.0", ("10.0.0.5",)),
+    ],
+)
+def test_the_addresses_that_are_heard_stand_behind_the_port(text: str, host: str, senders: tuple[str, ...]) -> None:
+    url = parse(text)
+    assert (url.host, url.port, url.senders, url.text) == (host, 14550, senders, text)
+    assert url.words().endswith(f", from {', '.join(senders)} only")
+    assert parse(url.text) == url
+
+
+@pytest.mark.parametrize(
     ("text", "device", "baud"),
     [
         ("/dev/ttyACM0", "/dev/ttyACM0", 57600),
@@ -139,6 +159,25 @@ def test_the_text_of_a_connection_describes_the_link() -> None:
         ("zenoh://localhost:7447", "is an output for ROS 2; write --ros2 zenoh://localhost:7447"),
         ("ur:10.0.0.1", "is an arm, not a source of MAVLink; write --arm ur:10.0.0.1"),
         ("file:///tmp/flight.tlog", "is a file; write its path alone: /tmp/flight.tlog"),
+        ("udp:14550?from=rover", "'rover' is not an address or a network, such as 10.0.0.5 or 10.0.0.0/24 (no host"),
+        ("udp:14550?from=10.0.0.5/24", "'10.0.0.5/24' is not an address or a network"),
+        ("udp:14550?from=10.0.0.5/24", "; write 10.0.0.5 or 10.0.0.0/24"),
+        ("udp:14550?from=10.0.0.5:14550", "; write 10.0.0.5"),
+        ("udp:[::]:14550?from=[fe80::1]", "; write fe80::1"),
+        ("udp:14550?from=10.0.0.256", "'10.0.0.256' is not an address"),
+        ("udp:14550?from=10.0.0.5&from=10.0.0.6", "is not an address or a network"),
+        ("udp:14550?from=10.0.0.5,", "from= names nobody; write an address or a network"),
+        ("udp:14550?from", "from= names nobody"),
+        ("udp:14550?form=10.0.0.5", "did you mean udp:14550?from=10.0.0.5 ?"),
+        ("udp:14550?from=fe80::1", "fe80::1 is IPv6, and 0.0.0.0 hears only IPv4; listen on [::]"),
+        ("udp:[::1]:14550?from=10.0.0.5", "10.0.0.5 is IPv4, and ::1 hears only IPv6; listen on [::]"),
+        ("udpout:10.0.0.5:14550?from=10.0.0.5", "from= is for links on which anybody can speak, udp: and tcpin:"),
+        ("10.0.0.5:14550?from=10.0.0.5", "tcpin:; write udpout:10.0.0.5:14550"),
+        ("udpbcast:10.0.0.255:14550?from=10.0.0.5", "tcpin:; write udpbcast:10.0.0.255:14550"),
+        ("tcp:10.0.0.5:5760?from=10.0.0.5", "tcpin:; write tcp:10.0.0.5:5760"),
+        ("/dev/ttyUSB0,57600?from=10.0.0.5", "tcpin:; write /dev/ttyUSB0,57600"),
+        ("serial:/dev/ttyUSB0?from=10.0.0.5", "tcpin:; write serial:/dev/ttyUSB0"),
+        ("flight.tlog?from=10.0.0.5", "tcpin:; write flight.tlog"),
         ("udp:", "has no port; write for example udp:127.0.0.1:14550"),
         ("tcp:[::1]", "has no port; write for example tcp:[::1]:5760"),
         ("192.168.1.20", "has no port; write 192.168.1.20:14550 to send there, or udp:192.168.1.20:14550 to listen"),

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import logging
-import math
 import shlex
-from collections import OrderedDict
 from typing import TYPE_CHECKING, Final
 
-from ..hardware.mavlink.message_table import IDS_WITH_FILES, WANTED_IDS
-from ..links.base import ServesClients
+from ..hardware.mavlink.message_table import WANTED_IDS
+from ..links.base import IDLE, SPEAKS, STAYS, ServesClients
 from ..links.guarded import open_guarded
-from ..links.udp import UdpSender
-from ..links.url import parse
+from ..links.udp import UdpBroadcaster, UdpSender
+from ..links.url import host_port, parse
 from ..mavlink.counters import Counters
 from ..mavlink.framing import Parser
+from ..paced_log import PacedLog
+from .channel import NEVER, PEER_SILENCE, Channel
+from .fair_table import SHARE, FairTable
 from .speech import LIMIT, Speech
 
 if TYPE_CHECKING:
@@ -22,95 +23,16 @@ if TYPE_CHECKING:
 
     from ..config import LinkConfig
     from ..links.base import Address, Link
-    from ..mavlink.encode import Encoder
     from ..mavlink.framing import Frame
 
 log = logging.getLogger(__name__)
 
-MOST_SOURCES: Final = 64
-"""Limit of channels of one link. A newcomer replaces the one silent longest, but none on which a vehicle speaks."""
-MOST_PEERS: Final = 8
-PEER_SILENCE: Final = 30.0
-"""Seconds of silence after which a peer is forgotten."""
-NEWCOMER_SILENCE: Final = 5.0
-"""Seconds for which a silent newcomer keeps its place. A peer that has spoken for longer keeps it for that time."""
+MOST_SOURCES: Final = 1024
+"""Limit of channels of one link. A newcomer replaces one that is silent, but none on which a vehicle speaks."""
+MOST_PEERS: Final = 64
+"""Limit of the peers of one link: those who get messages from us."""
 ACTIVE: Final = 10.0
 """Seconds since the last valid frame for which a peer counts as active."""
-NEVER: Final = -math.inf
-
-
-class Channel:
-    """One peer of a link: a MAVLink channel with its own sequence numbers. Compared by identity."""
-
-    __slots__ = (
-        "active_at",
-        "encoders",
-        "endpoint",
-        "frames",
-        "heard_at",
-        "interval",
-        "is_peer",
-        "parser",
-        "quiet",
-        "since",
-        "source",
-        "systems",
-        "wanted",
-    )
-
-    def __init__(self, endpoint: Endpoint, source: Address, parser: Parser) -> None:
-        self.endpoint = endpoint
-        self.source = source
-        """The address to send to; None: the link has one peer."""
-        self.parser = parser
-        self.heard_at = NEVER
-        """When (monotonic seconds) the last heartbeat arrived: of an autopilot, or of any component on an out."""
-        self.since = 0.0
-        """The first of these heartbeats."""
-        self.is_peer = not endpoint.listens
-        """Whether we send to it, and accept its requests."""
-        self.interval: float | None = None
-        """Seconds between two ROBOT_STATUS, as this peer requested. None: the default. inf: no messages."""
-        self.encoders: dict[int, Encoder] = {}
-        """By our system id."""
-        self.frames = -1
-        """The frames of the parser when `Endpoint.forget_silent` was called last."""
-        self.active_at = NEVER
-        self.quiet = False
-        """Whether all vehicles heard there send only HIGH_LATENCY2: each byte that we send there costs money."""
-        self.systems: set[int] = set()
-        """The system ids of the vehicles that are heard there: messages about others are not sent there."""
-        self.wanted = WANTED_IDS
-        """The ids of the messages that are used."""
-
-    @property
-    def is_out(self) -> bool:
-        """Whether it leads to ground stations and not to vehicles."""
-        return self.endpoint.is_out
-
-    @property
-    def passive(self) -> bool:
-        """Whether sending there is forbidden."""
-        return self.endpoint.passive
-
-    def hear_files(self, on: bool) -> None:
-        """Start or stop using messages that bring files. May be repeated: the channel may have another parser now."""
-        self.wanted = IDS_WITH_FILES if on else WANTED_IDS
-        self.parser.want(self.wanted)
-
-    def gives_way(self, now: float) -> bool:
-        """Whether it gives up its place to another, because no vehicle speaks on it."""
-        spoken = max(NEWCOMER_SILENCE, self.heard_at - self.since)
-        return now - self.heard_at > min(spoken, PEER_SILENCE)
-
-    def __str__(self) -> str:
-        """For example `10.1.2.3:14550, listening on 0.0.0.0:14550/udp`."""
-        text = self.endpoint.link.text
-        return f"{self.source[0]}:{self.source[1]}, {text}" if isinstance(self.source, tuple) else text
-
-    def send(self, frame: bytes) -> bool:
-        """Send to this peer. False if that fails, or on a passive link."""
-        return not self.endpoint.passive and self.endpoint.link.send(frame, self.source)
 
 
 class Endpoint:
@@ -123,7 +45,7 @@ class Endpoint:
         """As in the configuration."""
         self.link: Link = open_guarded(url)
         if isinstance(self.link, ServesClients):
-            self.link.is_active = self.is_active
+            self.link.priority = self.priority
         self.is_serial = url.kind.is_serial
         self.number: int
         """The number of the link in its gateway, from 0."""
@@ -134,7 +56,15 @@ class Endpoint:
         """Seconds without a heartbeat after which a vehicle there counts as lost. None: the link does not say."""
         self.speech = Speech()
         self._wanted: frozenset[int] | None = WANTED_IDS
-        self._channels: OrderedDict[Address, Channel] = OrderedDict()
+        self._table: FairTable[Channel] = FairTable(MOST_SOURCES)
+        self._channels = self._table.holders
+        self._peers: FairTable[Channel] = FairTable(MOST_PEERS)
+        """The peers of a link on which several speak."""
+        self._left_out: set[Address] = set()
+        """The addresses that got no channel since the last line in the log, as far as they are counted."""
+        self._unanswered: set[Address] = set()
+        """The same for those that got no place among the peers."""
+        self._tell_left_out, self._tell_unanswered = PacedLog(log), PacedLog(log)
         self._scratch = Parser(self._wanted)
         """Parses the first bytes of an address. Only a valid frame gives it a channel."""
         self._stranger: Address = None
@@ -151,8 +81,13 @@ class Endpoint:
         self._source_at = NEVER
         self._asks = self.link if isinstance(self.link, UdpSender) else None
         """A link that sends to one peer and receives datagrams of any address."""
+        self._hears_all = isinstance(self.link, UdpBroadcaster)
+        """Whether those who do not get what it sends are heard, too, each on a channel of its own."""
+        self._has_turned = False
+        """Whether it sends to another channel than when `heard` was called last."""
         if not self.listens:
-            self._only = self._channels[None] = Channel(self, None, Parser(self._wanted))
+            self._only = Channel(self, None, Parser(self._wanted))
+            self._table.add(self._only)
 
     def adjust(self, config: LinkConfig, number: int, *, keep_all: bool = False) -> None:
         """Change an open link: everything except its URL."""
@@ -178,12 +113,31 @@ class Endpoint:
             return channel
         if source != self._source:
             if self._asks is not None:
-                return None
+                return self._channel_of_other(source, now) if self._hears_all else None
             self._source = source  # a new connection: drop the incomplete frame of the last one
             self.connections += 1
             self._only.parser.reset()
         self._source_at = now
         return self._only
+
+    def _channel_of_other(self, source: Address, now: float) -> Channel | None:
+        """The channel of an address that a broadcast link hears and does not send to. It does if the peer is silent."""
+        channel = self._channels.get(source)
+        if channel is not None:
+            self._channels.move_to_end(source)
+            self._turn_to(channel, now)
+        return channel
+
+    def _turn_to(self, channel: Channel, now: float) -> None:
+        """Send to this address of a broadcast link from now on, unless the present one speaks."""
+        asks = self._asks
+        if asks is None or not asks.may_answer(channel.source, self._source, now - self._source_at):
+            return
+        asks.answered(channel.source)
+        before, self._only = self._only, channel
+        before.is_peer, before.interval, channel.is_peer = False, None, True
+        self._table.remove(None)  # what was there before anybody answered
+        self._source, self._source_at, self._has_turned = channel.source, now, True
 
     def hear_stranger(self, data: bytes, source: Address, now: float) -> tuple[Channel | None, list[Frame]]:
         """Parse data of an address without a channel. A valid frame gives it one, if there is a place."""
@@ -201,54 +155,66 @@ class Endpoint:
     def _admit(self, source: Address, now: float) -> Channel | None:
         """A channel for an address that speaks MAVLink. It gets the parser of its first bytes."""
         self._stranger = None
-        if self._asks is not None:
+        if self._asks is not None and not self._hears_all:
             if not self._asks.may_answer(source, self._source, now - self._source_at):
                 return None
             self._asks.answered(source)
             self._source, self._source_at = source, now
             self._only.parser, self._scratch = self._scratch, self._only.parser
             return self._only
-        spare = None  # reused: a new one costs as much as parsing a hundred frames, too much in a flood
-        if len(self._channels) >= MOST_SOURCES:
-            oldest = next((key for key, channel in self._channels.items() if channel.gives_way(now)), None)
-            if oldest is None:
-                return None
-            spare = self._channels.pop(oldest).parser
-        channel = self._channels[source] = Channel(self, source, self._scratch)
-        self._scratch = spare or Parser(self._wanted)
+        room, gone = self._table.make_room(source, now)
+        if not room:
+            if len(self._left_out) < MOST_SOURCES:
+                self._left_out.add(source)
+            return None
+        channel = Channel(self, source, self._scratch)
+        channel.is_peer = False
+        self._table.add(channel)
+        if gone is None:
+            self._scratch = Parser(self._wanted)
+        else:  # a new one costs as much as parsing a hundred frames, too much in a flood
+            self._scratch = gone.parser
+            self._peers.remove(gone.source)
+        self._turn_to(channel, now)
         return channel
 
     def heard(self, channel: Channel, now: float) -> bool:
-        """Note a heartbeat. On a listening link the channel becomes a peer, up to MOST_PEERS. True if it is new.
+        """Note a heartbeat. On a listening link the channel becomes a peer, up to MOST_PEERS.
 
-        A peer that is silent gives its place to one that speaks.
+        A peer that is silent gives its place to one that speaks. True if `peers` are others than before.
         """
-        if now - channel.heard_at > PEER_SILENCE:
-            channel.since = now
-        channel.heard_at = now
+        channel.hear(now)
+        if not self.listens:
+            turned, self._has_turned = self._has_turned, False
+            return turned
         if channel.is_peer:
             return False
-        peers = list(self.peers())
-        if len(peers) >= MOST_PEERS:
-            silent = min(peers, key=lambda peer: peer.heard_at)
-            if not silent.gives_way(now):
-                return False
-            silent.is_peer, silent.interval = False, None
-        channel.is_peer = True
-        return True
+        room, gone = self._peers.make_room(channel.source, now)
+        if gone is not None:
+            gone.is_peer, gone.interval = False, None
+        if room:
+            self._peers.add(channel)
+            channel.is_peer = True
+        elif len(self._unanswered) < MOST_SOURCES:
+            self._unanswered.add(channel.source)
+        return room
 
     def peers(self) -> Iterator[Channel]:
         """The channels that get messages from us."""
-        return (channel for channel in self._channels.values() if channel.is_peer)
+        return iter(self._peers.holders.values() if self.listens else (self._only,))
 
     def channels(self) -> Iterator[Channel]:
         """All channels."""
         return iter(self._channels.values())
 
-    def is_active(self, source: Address) -> bool:
-        """Whether valid frames arrive from this address. A server with too many clients drops others first."""
+    def priority(self, source: Address) -> int:
+        """How important a client is, see `ServesClients`. One on which an autopilot speaks keeps its place."""
         channel = self._channels.get(source)
-        return channel is not None and (channel.active_at > NEVER or channel.parser.counters.frames != channel.frames)
+        if channel is None:
+            return IDLE
+        if channel.heard_at > NEVER:
+            return STAYS
+        return SPEAKS if channel.active_at > NEVER or channel.parser.counters.frames != channel.frames else IDLE
 
     def forget_silent(self, now: float) -> None:
         """Drop the peers that are silent for PEER_SILENCE, with their requested intervals. Called once a second."""
@@ -261,6 +227,21 @@ class Endpoint:
                 channel.heard_at = NEVER
                 if self.listens:
                     channel.is_peer, channel.interval = False, None
+                    self._peers.remove(channel.source)
+        self._log_left_out(now)
+
+    def _log_left_out(self, now: float) -> None:
+        """Log how many have no channel, and how many are no peers, because there are too many."""
+        for addresses, tell, what, most in (
+            (self._left_out, self._tell_left_out, "not heard", MOST_SOURCES),
+            (self._unanswered, self._tell_unanswered, "neither answered nor forwarded", MOST_PEERS),
+        ):
+            if addresses and now >= tell.due:
+                number = f"{len(addresses)} sender{'s are' if len(addresses) > 1 else ' is'} {what}"
+                room = f"there is room for {most}, and for {most // SHARE} at one address"
+                line = f"{self.link.text}: {number}, {_where(next(iter(addresses)))} for one: {room}"
+                tell(logging.WARNING, now, line)
+                addresses.clear()
 
     def totals(self) -> Counters:
         """The counters of all channels, added up."""
@@ -307,3 +288,7 @@ def _renewed(parser: Parser, wanted: frozenset[int] | None) -> Parser:
     new = Parser(wanted)
     new.counters.add(parser.counters)
     return new
+
+
+def _where(source: Address) -> str:
+    return host_port(*source[:2]) if isinstance(source, tuple) else str(source)

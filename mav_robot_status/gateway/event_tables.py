@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
     from ..hardware.mavlink.px4_events import EventTable
     from ..hardware.mavlink.vehicle import TrackedVehicle
-    from .endpoint import Channel, Endpoint
+    from .channel import Channel
+    from .endpoint import Endpoint
     from .event_table_cache import EventTableCache
     from .link_hub import LinkHub
 

@@ -9,6 +9,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..config import Config
+from ..hardware.mavlink.identity import is_autopilot
 from ..hardware.mavlink.message_table import COMMAND_IDS
 from ..hardware.mavlink.state.claims import Claims
 from ..interface import Audience
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from ..hardware.mavlink.requests.scheduler import Ask
     from ..hardware.mavlink.vehicle import TrackedVehicle
     from ..links.base import Address
-    from .endpoint import Channel
+    from .channel import Channel
     from .observer import Observer
 
     Heard = list[tuple[Frame, Channel]]
@@ -199,6 +200,7 @@ class LinkHub:
                     if channel is not None:
                         self._hear(data, frames, channel, now, heard)
             if len(pieces) < BATCH:
+                self.pieces += not pieces  # the link may have refused some
                 break
             limit = 0 if link.stream else limit - max(BATCH, sum(len(data) for data, _ in pieces) // USUAL)
             if limit <= 0:
@@ -299,6 +301,8 @@ class LinkHub:
             self.sender.component.observe(frame)
             if endpoint.is_out:
                 self._note_heartbeat(channel, now.mono)
+            elif is_autopilot(frame.message, frame.ids[1]):
+                channel.hear(now.mono)
         elif frame.message_id in COMMAND_IDS:
             if channel.is_peer and verdict in (None, Verdict.VERIFIED):
                 self._handle_command(frame, channel)

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from ..hardware.mavlink.state.claims import Claims
     from ..interface import IndustrialRobotStatusInterface, IoSource
     from ..mavlink.framing import Frame
-    from .endpoint import Channel, Endpoint
+    from .channel import Channel
+    from .endpoint import Endpoint
     from .observer import Observer
 
 log = logging.getLogger(__name__)

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..config import Config, SigningConfig
     from ..hardware.mavlink.vehicle import TrackedVehicle
-    from .endpoint import Channel, Endpoint
+    from .channel import Channel
+    from .endpoint import Endpoint
 
 log = logging.getLogger(__name__)
 

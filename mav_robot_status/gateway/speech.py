@@ -13,7 +13,7 @@ from ..values import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from .endpoint import Channel
+    from .channel import Channel
 
 T = TypeVar("T")
 

@@ -74,10 +74,14 @@ class Link(Protocol):
 
 @runtime_checkable
 class ServesClients(Protocol):
-    """A link with a limited number of clients, which drops an inactive one for a new one."""
+    """A link with a limited number of clients, which drops a less important one for a new one."""
 
-    is_active: Callable[[Address], bool]
-    """Whether valid frames arrive from a client. The owner of the link sets it: a link knows no frames."""
+    priority: Callable[[Address], int]
+    """How important a client is: one of the priorities below. The owner of the link sets it: a link knows no frames."""
+
+
+IDLE, SPEAKS, STAYS = 0, 1, 2
+"""Priorities of a client: no valid frames arrive from it; they do; it keeps its place, for example a vehicle."""
 
 
 @runtime_checkable

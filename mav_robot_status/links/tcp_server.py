@@ -9,22 +9,27 @@ import math
 import random
 import select
 import socket
+import time
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
-from mav_robot_status.links.base import Address, Received
+from mav_robot_status.links.base import STAYS, Address, Received
 from mav_robot_status.links.listen import LocalPort
 from mav_robot_status.links.retry import Backoff, RandomFraction, StateLog
+from mav_robot_status.links.senders import Senders
 from mav_robot_status.links.stream import Stream, reason
 from mav_robot_status.links.tcp import tuned
 from mav_robot_status.links.url import Url, host_port
+from mav_robot_status.paced_log import BURST, PacedLog
 from mav_robot_status.values import NamedTuple
 
 log = logging.getLogger(__name__)
 
 MAX_CLIENTS = 8
-"""The most clients at a time. Clients that send no valid frames give way to new ones."""
+"""The most clients at a time. Those that matter least give way to new ones."""
+NEWCOMER: Final = 5.0
+"""Seconds for which a client keeps its place in any case: a vehicle sends its heartbeat once a second."""
 MAX_ACCEPTS = 16
 """The most connections that one `receive` accepts."""
 RETRY = 0.2, 5.0
@@ -40,6 +45,8 @@ class Client(NamedTuple):
     stream: Stream
     where: str
     host: str
+    since: float
+    """When it connected, in monotonic seconds."""
 
 
 class TcpServerLink:
@@ -50,22 +57,26 @@ class TcpServerLink:
 
     stream = True
 
-    def __init__(self, url: Url, fraction: RandomFraction = random.random) -> None:
+    def __init__(
+        self, url: Url, fraction: RandomFraction = random.random, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """Open it. Raises LinkError if the port is in use or not allowed, or the host is unknown.
 
         If this machine does not have the address, the link waits for it: the interface may come up later.
         """
         self.text = url.words()
         self.dropped = 0
-        self.is_active: Callable[[Address], bool] = lambda source: True
+        self.priority: Callable[[Address], int] = lambda source: STAYS
         self.refused = 0
         """How many clients were refused because there were MAX_CLIENTS."""
+        self._clock = clock
+        self._senders = Senders(url, "connection")
+        self._tell_refused, self._tell_gives_way = PacedLog(log), PacedLog(log)
+        self._tell_comes, self._tell_goes = PacedLog(log, *BURST), PacedLog(log, *BURST)
         self._backoff = Backoff(*RETRY, fraction)
         self._state_log = StateLog(log)
         self._clients: dict[int, Client] = {}
         self._numbers = itertools.count(1)
-        self._dropped_idle = False
-        """An idle client was dropped, and the log says so."""
         self._exhausted = False
         """No free descriptor for a client since the last `service`."""
         self._local_port = LocalPort(url, _new_socket, socket.SOCK_STREAM, self._state_log)
@@ -103,10 +114,11 @@ class TcpServerLink:
 
     def due(self) -> float:
         """When `service` has work."""
-        return self._due
+        return min(self._due, self._senders.due())
 
     def service(self, now: float) -> None:
-        """Retry to listen or to accept."""
+        """Retry to listen or to accept; log who was refused."""
+        self._senders.service(now, self.text)
         if now < self._due:
             return
         self._due = math.inf
@@ -149,29 +161,39 @@ class TcpServerLink:
                 self._due = -math.inf
 
     def _add_client(self, new: socket.socket, address: tuple[Any, ...]) -> None:
-        where = host_port(*address[:2])
-        if len(self._clients) >= MAX_CLIENTS and not self._make_room():
+        now, where = self._clock(), host_port(*address[:2])
+        if not self._senders.admits(address[0]):
+            new.close()
+            return
+        if len(self._clients) >= MAX_CLIENTS and not self._make_room(address[0], now):
             new.close()
             self.refused += 1
-            if self.refused == 1:
-                log.warning("%s: %s refused: already %d clients", self.text, where, MAX_CLIENTS)
+            line = f"{self.text}: {where} refused: already {MAX_CLIENTS} clients"
+            self._tell_refused(logging.WARNING, now, line)
             return
         self._backoff.reset()
         stream = Stream(self._epoll, tuned(new).fileno(), (*address[:2], next(self._numbers)))
-        self._clients[new.fileno()] = Client(new, stream, where, address[0])
-        log.info("%s: %s has connected", self.text, where)
+        self._clients[new.fileno()] = Client(new, stream, where, address[0], now)
+        self._tell_comes(logging.INFO, now, f"{self.text}: {where} has connected")
 
-    def _make_room(self) -> bool:
-        """Drop a client that sends no valid frames: of the host with the most clients, the one that came first."""
-        idle = [client for client in self._clients.values() if not self.is_active(client.stream.address)]
-        if not idle:
-            return False
+    def _make_room(self, host: str, now: float) -> bool:
+        """Drop the client that matters least, for a new one of this host.
+
+        Among equals one of the host with the most clients, and of those the one that came first. A new client keeps its
+        place for a while, unless its host has more than the new one.
+        """
         clients = Counter(client.host for client in self._clients.values())
-        oldest = max(idle, key=lambda client: clients[client.host])
-        if not self._dropped_idle:
-            log.warning("%s: %s sends no valid frames and makes room for a new client", self.text, oldest.where)
-        self._dropped_idle = True
-        self._drop(oldest)
+        dispensable = {
+            client: priority
+            for client in self._clients.values()
+            if (now - client.since > NEWCOMER or clients[client.host] > clients[host] + 1)
+            and (priority := self.priority(client.stream.address)) < STAYS
+        }
+        if not dispensable:
+            return False
+        client = min(dispensable, key=lambda client: (dispensable[client], -clients[client.host]))
+        self._tell_gives_way(logging.WARNING, now, f"{self.text}: {client.where} makes room for a new client")
+        self._drop(client)
         return True
 
     def _send(self, client: Client, data: bytes) -> bool:
@@ -182,7 +204,7 @@ class TcpServerLink:
             return False
 
     def _disconnect(self, client: Client, error: OSError) -> None:
-        log.info("%s: %s is gone: %s", self.text, client.where, reason(error))
+        self._tell_goes(logging.INFO, self._clock(), f"{self.text}: {client.where} is gone: {reason(error)}")
         self._drop(client)
 
     def _drop(self, client: Client) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+import select
 import socket
 from collections.abc import Iterator
 from typing import Any
@@ -8,7 +9,9 @@ from typing import Any
 import pytest
 
 from mav_robot_status.config import LinkConfig
-from mav_robot_status.gateway.endpoint import MOST_PEERS, MOST_SOURCES, PEER_SILENCE, Channel, Endpoint
+from mav_robot_status.gateway.channel import PEER_SILENCE, Channel
+from mav_robot_status.gateway.endpoint import MOST_PEERS, MOST_SOURCES, Endpoint
+from mav_robot_status.links.base import IDLE, SPEAKS, STAYS
 from mav_robot_status.mavlink.definitions import Heartbeat, NamedValueInt
 from mav_robot_status.mavlink.encode import enclose, encode
 
@@ -118,10 +121,61 @@ def test_a_peer_that_has_spoken_for_long_keeps_its_place_for_as_long(endpoint: E
     assert endpoint.heard(vehicle, 41.0)
 
 
-def test_the_first_eight_peers_are_kept(endpoint: Endpoint) -> None:
-    for number in range(MOST_SOURCES):
+def test_the_first_peers_are_kept_and_one_line_says_how_many_get_nothing(
+    endpoint: Endpoint, caplog: pytest.LogCaptureFixture
+) -> None:
+    for number in range(MOST_PEERS + 10):
         endpoint.heard(admitted(endpoint, number), 0.0)
     assert [channel.source for channel in endpoint.peers()] == list(range(MOST_PEERS))
+    for second in range(1, 8):
+        endpoint.forget_silent(float(second))
+    [line] = caplog.messages
+    assert line.startswith(f"{endpoint.link.text}: 10 senders are neither answered nor forwarded, ")
+    assert line.endswith(" for one: there is room for 64, and for 16 at one address")
+
+
+def test_the_vehicles_of_a_fleet_have_a_channel_each_at_one_address_or_at_many(endpoint: Endpoint) -> None:
+    for number in range(254):
+        for source in (("10.0.0.1", number), (f"10.0.1.{number}", 14550)):
+            admitted(endpoint, source).hear(0.0)
+    assert len(list(endpoint.channels())) == 2 * 254
+
+
+def test_one_address_holds_at_most_a_quarter_of_the_channels_and_one_line_counts_the_rest(
+    endpoint: Endpoint, caplog: pytest.LogCaptureFixture
+) -> None:
+    for port in range(300):
+        channel, _ = endpoint.hear_stranger(HEARTBEAT, ("10.0.0.1", port), 0.0)
+        if channel is not None:
+            channel.hear(0.0)
+    assert len(list(endpoint.channels())) == MOST_SOURCES // 4
+    endpoint.forget_silent(1.0)
+    assert endpoint.hear_stranger(HEARTBEAT, ("10.0.0.1", 300), 2.0)[0] is None
+    endpoint.forget_silent(2.0)
+    endpoint.forget_silent(31.0)
+    first, second = caplog.messages
+    assert first.startswith(f"{endpoint.link.text}: 44 senders are not heard, 10.0.0.1:")
+    where = "10.0.0.1:300 for one: there is room for 1024, and for 256 at one address"
+    assert second == f"{endpoint.link.text}: 1 sender is not heard, {where}"
+    assert admitted(endpoint, ("10.0.0.2", 14550))
+
+
+def test_one_address_holds_at_most_a_quarter_of_the_places_of_peers(endpoint: Endpoint) -> None:
+    became = [endpoint.heard(admitted(endpoint, ("10.0.0.1", port)), 0.0) for port in range(20)]
+    assert became == [True] * 16 + [False] * 4
+    assert endpoint.heard(admitted(endpoint, ("10.0.0.2", 14550)), 0.0)
+
+
+def test_a_client_on_which_an_autopilot_speaks_stays_and_idle_ones_matter_least(endpoint: Endpoint) -> None:
+    vehicle, station = admitted(endpoint, "vehicle"), admitted(endpoint, "station")
+    vehicle.hear(0.0)
+    endpoint.forget_silent(1.0)
+    assert [endpoint.priority(source) for source in ("vehicle", "station", "idle")] == [STAYS, SPEAKS, IDLE]
+    endpoint.forget_silent(20.0)
+    assert [endpoint.priority(source) for source in ("vehicle", "station")] == [STAYS, IDLE]
+    station.parser.feed(HEARTBEAT)
+    endpoint.forget_silent(PEER_SILENCE + 1)
+    assert [endpoint.priority(source) for source in ("vehicle", "station")] == [IDLE, SPEAKS]
 
 
 def test_a_peer_and_its_requested_interval_are_forgotten_after_30_s_of_silence(endpoint: Endpoint) -> None:
@@ -174,6 +228,51 @@ def test_the_address_that_answers_keeps_its_place_while_it_sends_anything(peer: 
         only = admitted(out, ("127.0.0.1", port))
         assert out.channel(("127.0.0.1", port), 5.0) is only
         assert out.hear_stranger(HEARTBEAT, ("10.9.9.9", 5), 6.0) == (None, [])
+
+
+def sends_to(link: Endpoint, peers: list[socket.socket]) -> list[socket.socket]:
+    """Those who get what the link sends, of these."""
+    assert [channel.send(b"x") for channel in link.peers()] == [True]
+    ready, _, _ = select.select(peers, [], [], 5)
+    for peer in ready:
+        peer.recv(100)
+    return ready
+
+
+def test_a_broadcast_link_hears_every_address_and_sends_to_the_one_that_answers() -> None:
+    with contextlib.ExitStack() as opened:
+        first, second = (opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2))
+        for peer in (first, second):
+            peer.bind(("127.0.0.1", 0))
+        link = Endpoint(LinkConfig("udpbcast:127.255.255.255:9"))
+        opened.callback(link.link.close)
+        one, two = admitted(link, first.getsockname()), admitted(link, second.getsockname(), 1.0)
+        assert one is not two
+        assert sends_to(link, [first, second]) == [first]
+        assert not two.send(b"x")
+        assert link.heard(one, 1.0)  # the peers have changed, told once
+        assert not link.heard(one, 1.0)
+
+        for now in (1.5, 3.4):
+            assert link.channel(second.getsockname(), now) is two
+        assert sends_to(link, [first, second]) == [first]
+        assert link.channel(second.getsockname(), 4.1) is two  # the first one is silent for more than 3.5 s
+        assert sends_to(link, [first, second]) == [second]
+
+        assert link.channel(first.getsockname(), 4.2) is one
+        assert sends_to(link, [first, second]) == [second]
+        assert {channel.source for channel in link.channels()} == {first.getsockname(), second.getsockname()}
+
+
+def test_a_flood_on_a_broadcast_link_does_not_end_the_channel_that_it_sends_to() -> None:
+    link = Endpoint(LinkConfig("udpbcast:127.255.255.255:9"))
+    with contextlib.closing(link.link):
+        answering = admitted(link, ("127.0.0.1", 5))
+        for number in range(MOST_SOURCES * 2):
+            admitted(link, (f"10.0.{number // 250}.{number % 250}", 5), 1.0)
+        assert len(list(link.channels())) == MOST_SOURCES
+        assert list(link.peers()) == [answering]
+        assert link.channel(("127.0.0.1", 5), 1.0) is answering
 
 
 def test_a_new_connection_does_not_continue_a_frame_of_the_previous_one() -> None:

@@ -9,18 +9,33 @@ from contextlib import ExitStack
 import pytest
 
 from mav_robot_status.errors import LinkError
-from mav_robot_status.links.tcp_server import MAX_CLIENTS, RETRY, TcpServerLink
+from mav_robot_status.links.base import IDLE, SPEAKS, STAYS
+from mav_robot_status.links.tcp_server import MAX_CLIENTS, NEWCOMER, RETRY, TcpServerLink
 from mav_robot_status.links.url import parse
 from mav_robot_status.testing.conformance.links import LinkDriver, readable
 
 from .peers import port_of
 
-Connect = Callable[[], socket.socket]
+Connect = Callable[..., socket.socket]
+
+
+class Clock:
+    """A clock that a test sets."""
+
+    now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture(name="clock")
+def fixture_clock() -> Clock:
+    return Clock()
 
 
 @pytest.fixture(name="link")
-def fixture_link() -> Iterator[TcpServerLink]:
-    link = TcpServerLink(parse("tcpin:127.0.0.1:0"), fraction=lambda: 0.0)
+def fixture_link(clock: Clock) -> Iterator[TcpServerLink]:
+    link = TcpServerLink(parse("tcpin:127.0.0.1:0"), fraction=lambda: 0.0, clock=clock)
     yield link
     link.close()
 
@@ -29,8 +44,8 @@ def fixture_link() -> Iterator[TcpServerLink]:
 def fixture_connect(link: TcpServerLink) -> Iterator[Connect]:
     with ExitStack() as clients:
 
-        def connect() -> socket.socket:
-            client = clients.enter_context(socket.create_connection(("127.0.0.1", port_of(link)), 5))
+        def connect(host: str = "127.0.0.1") -> socket.socket:
+            client = clients.enter_context(socket.create_connection(("127.0.0.1", port_of(link)), 5, (host, 0)))
             assert readable(link.fileno())
             link.receive()
             return client
@@ -174,19 +189,95 @@ def test_without_free_descriptors_the_server_neither_fails_nor_spins(
         assert LinkDriver(link).received(7) == b"at last"
 
 
-def test_a_client_without_valid_frames_gives_way_to_a_new_one(
-    link: TcpServerLink, connect: Connect, caplog: pytest.LogCaptureFixture
+def speaking(link: TcpServerLink, client: socket.socket) -> object:
+    """The source of a client that has sent something."""
+    client.sendall(b"x")
+    assert readable(link.fileno())
+    [piece] = link.receive()
+    return piece.source
+
+
+def is_open(client: socket.socket) -> bool:
+    client.setblocking(False)
+    try:
+        return client.recv(1) != b""
+    except BlockingIOError:
+        return True
+
+
+def test_a_client_without_valid_frames_gives_way_before_one_with_and_a_vehicle_never(
+    link: TcpServerLink, connect: Connect, clock: Clock, caplog: pytest.LogCaptureFixture
 ) -> None:
     clients = [connect() for _ in range(MAX_CLIENTS)]
-    active: list[object] = []
-    link.is_active = active.__contains__
-    for client in clients[:-1]:
-        client.sendall(b"x")
+    priorities = {speaking(link, client): STAYS for client in clients}
+    *_, talker, idle = priorities
+    priorities.update({talker: SPEAKS, idle: IDLE})
+    link.priority = lambda source: priorities.get(source, STAYS)
+    assert not is_open(connect())  # all are new
+    clock.now += NEWCOMER + 1
+    for gone in (clients[-1], clients[-2]):
+        assert is_open(gone)
+        assert is_open(connect())
+        assert not is_open(gone)
+    assert not is_open(connect())
+    assert link.refused == 2
+    assert sum("makes room for a new client" in line for line in caplog.messages) == 1
+
+
+def test_clients_that_speak_and_come_back_do_not_drop_a_vehicle_before_its_first_heartbeat(
+    link: TcpServerLink, connect: Connect, clock: Clock
+) -> None:
+    link.priority = lambda source: SPEAKS
+    talkers = [connect() for _ in range(MAX_CLIENTS)]
+    clock.now += NEWCOMER + 1
+    vehicle = connect()
+    for _ in range(MAX_CLIENTS * 2):
+        talkers.append(connect())
+    assert is_open(vehicle)
+
+
+def test_a_host_with_many_new_clients_gives_way_to_another_host(
+    link: TcpServerLink, connect: Connect, clock: Clock
+) -> None:
+    link.priority = lambda source: SPEAKS
+    crowd = [connect() for _ in range(MAX_CLIENTS)]
+    vehicle = connect("127.0.0.2")
+    assert is_open(vehicle)
+    assert [is_open(client) for client in crowd] == [False] + [True] * (MAX_CLIENTS - 1)
+
+
+def test_lines_that_clients_cause_are_paced_and_counted(
+    link: TcpServerLink, connect: Connect, clock: Clock, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    for _ in range(100):
+        connect().close()
+        clock.now += 0.1
         assert readable(link.fileno())
-        active += [piece.source for piece in link.receive()]
-    newest = connect()
-    newest.sendall(b"new")
-    assert readable(link.fileno())
-    assert [piece.data for piece in link.receive()] == [b"new"]
-    assert clients[-1].recv(1) == b""
-    assert link.refused == 0
+        link.receive()
+    assert len(caplog.messages) == 16
+    clock.now += 240
+    connect()
+    assert caplog.messages[-1].endswith("has connected (92 lines before it were left out)")
+
+
+def test_connections_from_other_addresses_are_closed_and_counted(caplog: pytest.LogCaptureFixture) -> None:
+    link = TcpServerLink(parse("tcpin:127.0.0.1:0?from=127.0.0.5"))
+    try:
+        for _ in range(3):
+            with socket.create_connection(("127.0.0.1", port_of(link)), 5) as other:
+                assert readable(link.fileno())
+                assert link.receive() == []
+                assert not is_open(other)
+        assert link.due() == -math.inf
+        link.service(100.0)
+        assert link.due() == math.inf
+        assert caplog.messages == [f"{link.text}: refused 3 connections from 127.0.0.1, which is not in from=127.0.0.5"]
+        assert link.text.endswith("/tcp, from 127.0.0.5 only")
+        with socket.create_connection(("127.0.0.1", port_of(link)), 5, ("127.0.0.5", 0)) as vehicle:
+            assert readable(link.fileno())
+            assert link.receive() == []
+            vehicle.sendall(b"heard")
+            assert LinkDriver(link).received(5) == b"heard"
+    finally:
+        link.close()

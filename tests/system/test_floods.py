@@ -215,12 +215,39 @@ def test_idle_clients_do_not_lock_a_vehicle_out_of_a_server(gateway: Callable[..
             thread.join()
 
 
-def tcp_vehicle(port: int, stop: threading.Event) -> None:
-    """A vehicle that connects again when it is refused."""
+def test_clients_that_speak_as_ground_stations_do_not_lock_a_vehicle_out_of_a_server(
+    gateway: Callable[..., Gateway],
+) -> None:
+    gate = gateway("tcpin:127.0.0.1:0")
+    port = int(gate.wait_for_log(r"listening on \S+:(\d+)/tcp")[1])
+    stop = threading.Event()
+    station = encode(Heartbeat(0, 6, 8, 0, 4, 3), system=255, component=190, sequence=0)
+    threads = [threading.Thread(target=tcp_vehicle, args=(port, stop, station)) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    try:
+        wait_until(lambda: sum("has connected" in line for line in gate.log) == 8)
+        threads.append(threading.Thread(target=tcp_vehicle, args=(port, stop)))
+        threads[-1].start()
+        gate.wait_for(is_real, what="status of the real vehicle", seconds=20)
+        since = time.monotonic()
+        gate.wait_for(lambda s: s["link"]["heartbeat_age"] is not None, after=since + 8, seconds=20)
+        assert all(line.status["link"]["state"] == "CONNECTED" for line in gate.lines if line.at > since)
+    finally:
+        stop.set()
+        for thread in threads:
+            thread.join()
+
+
+REAL = encode(Heartbeat(0, 10, 3, 65, 4, 3), system=1, component=1, sequence=0)
+
+
+def tcp_vehicle(port: int, stop: threading.Event, beat: bytes = REAL) -> None:
+    """A vehicle, or another sender, that connects again when it is refused."""
     while not stop.is_set():
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)) as connection:
             while not stop.wait(0.3):
-                connection.sendall(encode(Heartbeat(0, 10, 3, 65, 4, 3), system=1, component=1, sequence=0))
+                connection.sendall(beat)
         stop.wait(0.3)
 
 

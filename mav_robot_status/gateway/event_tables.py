@@ -24,6 +24,7 @@ from ..mavlink.definitions import ComponentMetadata, FileTransferProtocol
 from ..mavlink.ftp.download import Failure
 from ..mavlink.ftp.payload import message, unpack
 from ..mavlink.ftp.table_download import TableDownload
+from ..paced_log import BURST, PacedLog
 from ..values import NamedTuple
 from .worker import Worker
 
@@ -116,6 +117,7 @@ class EventTables:
         self._coming: set[int] = set()
         """The checksums of the offers whose tables are on their way."""
         self._worker = Worker("tables of events")
+        self._paced, self._now = PacedLog(log, *BURST), -math.inf
         self.next_due = math.inf
         """When (monotonic seconds) `due` has something to do."""
 
@@ -164,6 +166,7 @@ class EventTables:
 
     def due(self, now: float, find: Callable[[int, int], TrackedVehicle | None]) -> list[Ask]:
         """Do what is due at `now`; the requests to send. `find` finds a vehicle."""
+        self._now = now
         self._worker.finish()
         self._busy = {vehicle.channel.endpoint for vehicle in self._vehicles.values() if vehicle.channel is not None}
         coming = (_Stage.FETCHING, _Stage.READING)
@@ -217,13 +220,13 @@ class EventTables:
         if table is None:
             vehicle.stage, vehicle.due = _Stage.WAITING, -math.inf
         else:
-            log.info("vehicle %d.%d: the table of its events is in the cache", *ids)
+            self._tell(ids, "the table of its events is in the cache")
             self._keep(vehicle.offer.crc, table)
             self._give(ids, vehicle, table)
 
     def _share(self, ids: Ids, vehicle: _Vehicle) -> None:
         """Another vehicle has brought the table."""
-        log.info("vehicle %d.%d: it uses the table of events of another vehicle", *ids)
+        self._tell(ids, "it uses the table of events of another vehicle")
         self._give(ids, vehicle, self._tables[vehicle.offer.crc])
 
     def _begin(self, ids: Ids, vehicle: _Vehicle, now: float) -> None:
@@ -279,13 +282,16 @@ class EventTables:
 
     # outcomes
 
+    def _tell(self, ids: Ids, what: str) -> None:
+        self._paced(logging.INFO, self._now, f"vehicle {ids[0]}.{ids[1]}: {what}")
+
     def _fetched(self, ids: Ids, vehicle: _Vehicle, outcome: bytes | Failure, now: float) -> None:
         vehicle.stage = _Stage.READING
         if isinstance(outcome, Failure):
             self._give_up(ids, vehicle, outcome.reason)
             return
         seconds = now - vehicle.started
-        log.info("vehicle %d.%d: the table of its events is read, %d bytes in %.1f s", *ids, len(outcome), seconds)
+        self._tell(ids, f"the table of its events is read, {len(outcome)} bytes in {seconds:.1f} s")
         self._worker.do(
             lambda: self._parse_and_store(vehicle.offer.crc, outcome),
             lambda table: self._parsed(ids, vehicle, outcome, table),
@@ -329,7 +335,7 @@ class EventTables:
         vehicle.stage = _Stage.GIVEN_UP
         if self._vehicles.get(ids) is vehicle:
             self.given_up[ids] = reason
-            log.info("vehicle %d.%d: no table of its events: %s", *ids, reason)
+            self._tell(ids, f"no table of its events: {reason}")
 
     def close(self) -> None:
         """The last call: a table that was just read may still be on its way to the disk."""

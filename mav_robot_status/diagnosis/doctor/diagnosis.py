@@ -160,7 +160,7 @@ CASES: Final = (
     Case("elsewhere", "no MAVLink arrives here, but it does on another port or at another baud rate",
          lambda f: _no_mavlink(f) and f.place.elsewhere,
          lambda f: f"no MAVLink arrives here, but it does on {f.place.elsewhere}",
-         lambda f: f"write {f.place.elsewhere}"),
+         lambda f: f"{'add the sender to from=, or ' if f.url.senders else ''}write {f.place.elsewhere}"),
     Case("udp-silent", "listening on UDP, and nothing is sent to this port",
          _silent("udp", listens=True),
          lambda f: f"nothing was sent to UDP port {f.url.port} within {f.seconds:.1f} s", let_send),

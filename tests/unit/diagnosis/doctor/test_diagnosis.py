@@ -52,6 +52,13 @@ DIAGNOSES = [
     (found(SERIAL, place=TWO_DEVICES), "device-missing", "/dev/ttyACM0, /dev/ttyUSB0", "one of those"),
     (found(SERIAL, place=Place("missing", devices=("/dev/ttyACM0",))), "device-missing", "", "write /dev/ttyACM0"),
     (found(SERIAL, place=Place(holder="mavproxy.py (pid 7)")), "device-held", "held by mavproxy.py (pid 7)", "end"),
+    (found(place=Place(elsewhere="udp:5")), "elsewhere", "but it does on udp:5", "write udp:5"),
+    (
+        found("udp:5?from=10.0.0.5", place=Place(elsewhere="udp:5")),
+        "elsewhere",
+        "",
+        "add the sender to from=, or write",
+    ),
     (found(place=HERE), "udp-silent", "UDP port 14550 within 5.0 s", "udp:0.0.0.0:14550"),
     (found("udp:0.0.0.0:1", place=HERE), "udp-silent", "", "send to 10.0.0.2:1 or 192.168.1.3:1"),
     (found("udp:10.0.0.2:1", place=HERE), "udp-silent", "", "send to 10.0.0.2:1, and let this computer's firewall"),

@@ -295,7 +295,10 @@ class LinkHub:
 
     def _accepts(self, frame: Frame, channel: Channel, now: Instant) -> bool:
         """Whether the hardware interface gets this frame. Handles commands to us."""
-        verdict = None if self.sender.signing_policy is None else proof(frame)
+        policy = self.sender.signing_policy
+        if policy is not None and not policy.may_speak(frame):
+            return False
+        verdict = None if policy is None else proof(frame)
         endpoint = channel.endpoint
         if frame.message_id == HEARTBEAT:
             self.sender.component.observe(frame)

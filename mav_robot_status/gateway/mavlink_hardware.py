@@ -203,7 +203,7 @@ class MavlinkHardware:
             for ask in self.tables.due(now.mono, self.vehicles.find):
                 self.hub.ask(ask)
         if self.hub.sender.signing_policy is not None:
-            self.hub.sender.signing_policy.keep()
+            self.hub.sender.signing_policy.keep(now.mono)
         if now.mono >= self._timer_due:
             self._serve_timers(now.mono)
 

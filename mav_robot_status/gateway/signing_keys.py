@@ -1,21 +1,19 @@
-"""The files of signing: the key, which the user writes, and the time stamp, which must survive a restart."""
+"""The files of signing: the key, which the user writes, and the time stamps, which must survive a restart."""
 
 from __future__ import annotations
 
-import logging
+import math
 import os
 import re
-import threading
-from contextlib import suppress
+import zlib
 from hashlib import sha256
 from pathlib import Path
 from stat import S_IRGRP, S_IROTH, S_IWGRP, S_IWOTH
 from typing import Final
 
 from ..errors import UsageError
-from ..mavlink.signing import MAX_STAMP, UNITS_PER_SECOND, stamp_at
-
-log = logging.getLogger(__name__)
+from ..mavlink.signing import MAX_STAMP, MAX_STREAMS, UNITS_PER_SECOND, Stamps, stamp_at
+from .state_file import StateFile
 
 MAX_BYTES: Final = 4096
 """The size limit of a key file."""
@@ -28,7 +26,8 @@ RESERVE: Final = 40 * UNITS_PER_SECOND
 """Lead of the time stamp on disk. Less than the minute that a peer may be behind us after a crash."""
 RENEW: Final = 10 * UNITS_PER_SECOND
 """When the lead falls below this, the next stamp is written: every 30 s, and 10 s before it is needed."""
-PATIENCE: Final = 2.0  # s to wait for a running write at shutdown
+HEARD_PERIOD: Final = 2.0  # s between two writes of the stamps that were heard
+LINE: Final = len(f"255 255 {MAX_STAMP}\n")  # bytes of one stamp that was heard, at most
 
 
 def read_key(path: str | os.PathLike[str]) -> bytes:
@@ -71,7 +70,7 @@ def _key(data: bytes, name: str) -> bytes:
 def stamp_path(key: bytes) -> Path:
     """The file of a key's time stamp, in systemd's STATE_DIRECTORY or the user's state folder.
 
-    The name differs for each key, and does not reveal the key.
+    The name differs for each key, and does not reveal the key. The stamps that were heard are in a file beside it.
     """
     home = os.environ.get("XDG_STATE_HOME", "")
     if not os.path.isabs(home):  # a relative path is invalid: https://specifications.freedesktop.org/basedir-spec
@@ -90,71 +89,100 @@ class StampStore:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self._file = StateFile(path, "signing time stamp", "signing continues with the clock alone")
         self._reserved = 0
-        self._writer: threading.Thread | None = None
-        self._warned = False
 
     def start(self, unix_us: int) -> int:
         """The first stamp at this time. Reads the file and writes it; both wait for the disk."""
         stamp = max(self._read(), stamp_at(unix_us))
-        self._reserve(stamp)
-        self._write(self._reserved)
+        self._file.write(self._reserve(stamp))
         return stamp
 
     def keep(self, stamp: int) -> None:
         """Store the last stamp that was used or received, if it is due. Called in every turn; never waits."""
         if self._reserved - stamp >= RENEW or self._reserved == MAX_STAMP:
             return
-        if self._writer is None or not self._writer.is_alive():
-            self._reserve(stamp)
-            self._writer = threading.Thread(target=self._write, args=(self._reserved,), name="stamp", daemon=True)
-            self._writer.start()
+        if not self._file.writing:
+            self._file.write_later(self._reserve(stamp))
 
     def close(self, stamp: int) -> None:
         """Write the last stamp without a lead, so that the next start skips no stamps."""
         if self.settle():
-            self._write(stamp)
+            self._file.write(b"%d\n" % stamp)
 
     def settle(self) -> bool:
-        """Wait for a running write, at most PATIENCE seconds. True if no write is running."""
-        if self._writer is not None:
-            self._writer.join(PATIENCE)
-        return self._writer is None or not self._writer.is_alive()
+        """Wait for a running write, see `StateFile.settle`."""
+        return self._file.settle()
 
-    def _reserve(self, stamp: int) -> None:
+    def _reserve(self, stamp: int) -> bytes:
         self._reserved = min(stamp + RESERVE, MAX_STAMP)
+        return b"%d\n" % self._reserved
 
     def _read(self) -> int:
-        try:
-            with open(self._path, "rb") as file:
-                text = file.read(32).strip()
-        except FileNotFoundError:
+        data = self._file.read(32)
+        if data is None:
             return 0
-        except OSError as error:
-            self._warn(f"cannot read the last signing time stamp: {error.strerror}")
-            return 0
+        text = data.strip()
         if not text.isdigit() or int(text) > MAX_STAMP:
-            self._warn("this is not a signing time stamp")
+            self._file.warn("this is not a signing time stamp")
             return 0
         return int(text)
 
-    def _write(self, stamp: int) -> None:
-        """Replace the file atomically: write a temporary file next to it, then rename."""
-        temporary = self._path.with_suffix(f".{os.getpid()}")
-        try:
-            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as file:
-                file.write(b"%d\n" % stamp)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, self._path)
-        except OSError as error:
-            self._warn(f"cannot write the signing time stamp: {error.strerror}")
-            with suppress(OSError):
-                temporary.unlink()
 
-    def _warn(self, what: str) -> None:
-        if not self._warned:
-            self._warned = True
-            log.warning("%s: %s; signing continues with the clock alone", self._path, what)
+class HeardStore:
+    """Stores the newest verified stamp of each sender, so that what was recorded before a restart is not news after it.
+
+    A kill of the process loses at most HEARD_PERIOD. The disk is not synced: a power failure may lose half a minute.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = StateFile(
+            path, "list of the time stamps heard", "frames recorded before this start are refused only by their age"
+        )
+        self._written = b""
+        self._due = -math.inf
+
+    def start(self) -> Stamps:
+        """The stamps of the run before; none if the file is absent or damaged. Waits for the disk."""
+        data = self._file.read(LINE * (MAX_STREAMS + 1))
+        if data is None:
+            return {}
+        try:
+            return _heard(data)
+        except ValueError:
+            self._file.warn("this is not a list of the time stamps heard")
+            return {}
+
+    def keep(self, newest: Stamps, now: float) -> None:
+        """Store the stamps if they are due and have changed; `now` is monotonic seconds. Never waits."""
+        if now < self._due or self._file.writing:
+            return
+        self._due = now + HEARD_PERIOD
+        data = _list(newest)
+        if data != self._written:
+            self._written = data
+            self._file.write_later(data, sync=False)
+
+    def close(self, newest: Stamps) -> None:
+        """Write the last stamps."""
+        if self._file.settle():
+            self._file.write(_list(newest))
+
+
+def _list(newest: Stamps) -> bytes:
+    """A checksum, then a line for each sender. Of more than MAX_STREAMS, those with the newest stamps."""
+    rows = sorted(newest.items(), key=lambda row: -row[1])[:MAX_STREAMS]
+    text = "".join(f"{system} {component} {stamp}\n" for (system, component), stamp in rows).encode()
+    return b"%08x\n%s" % (zlib.crc32(text), text)
+
+
+def _heard(data: bytes) -> Stamps:
+    """The stamps in a list. Raises ValueError if it is damaged."""
+    checksum, _, text = data.partition(b"\n")
+    if checksum != b"%08x" % zlib.crc32(text):
+        raise ValueError
+    stamps = {}
+    for line in text.splitlines():
+        system, component, stamp = map(int, line.split())
+        stamps[system, component] = min(stamp, MAX_STAMP)
+    return stamps

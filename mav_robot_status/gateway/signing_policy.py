@@ -24,12 +24,14 @@ class SigningPolicy:
 
     def __init__(self, config: SigningConfig, now: Instant) -> None:
         """Read the key. Raises UsageError if it cannot be read."""
-        from .signing_keys import StampStore, read_key, stamp_path
+        from .signing_keys import HeardStore, StampStore, read_key, stamp_path
 
         key = read_key(config.key_file)
-        self._store = StampStore(stamp_path(key))
+        path = stamp_path(key)
+        self._store, self._heard = StampStore(path), HeardStore(path.with_suffix(".heard"))
         self._signer = Signer(key, config.link_id, self._store.start(now.unix_us))
-        self._verifier = Verifier(self._signer, config.accept_unsigned)
+        self._verifier = Verifier(self._signer, config.accept_unsigned, self._heard.start())
+        self._accepts_all = config.accept_unsigned == "all"
         self._heal_at = -math.inf
 
     def sign(self, frame: bytes, unix_us: int, link: int) -> bytes:
@@ -39,6 +41,18 @@ class SigningPolicy:
     def judge(self, frame: Frame, now: Instant) -> Verdict:
         """The verdict on a received frame. A command needs VERIFIED."""
         return self._verifier.judge(frame, now.unix_us)
+
+    def lag(self, frame: Frame) -> float:
+        """Seconds by which a VERIFIED frame is late, see `Verifier.lag`. Call it after `judge`, before the next one."""
+        return self._verifier.lag(frame)
+
+    def may_speak(self, frame: Frame) -> bool:
+        """Whether a frame that was accepted may speak for the vehicle with its ids.
+
+        A verified one may. An unsigned one may if the configuration accepts all, and no frame of these ids was verified
+        since the start: what a radio may send unsigned says nothing about a vehicle.
+        """
+        return is_signed(frame) or (self._accepts_all and not self._verifier.signs(frame.ids))
 
     def may_heal(self, verdict: Verdict, now: float) -> bool:
         """Whether to answer a heartbeat with ours, from which an autopilot with an old time stamp sets its own.
@@ -50,9 +64,10 @@ class SigningPolicy:
         self._heal_at = now
         return True
 
-    def keep(self) -> None:
-        """Write the time stamp to disk if it is due. Called in every turn."""
+    def keep(self, now: float) -> None:
+        """Write the time stamps to disk if they are due. Called in every turn; `now` is monotonic seconds."""
         self._store.keep(self._signer.stamp)
+        self._heard.keep(self._verifier.newest, now)
 
     def summary(self) -> str:
         """The verdicts that occurred, with their counts, as text."""
@@ -60,8 +75,9 @@ class SigningPolicy:
         return ", ".join(f"{number} {WORDS[verdict]}" for verdict, number in counters.items() if number)
 
     def close(self) -> None:
-        """The last call: write the time stamp, log the counters."""
+        """The last call: write the time stamps, log the counters."""
         self._store.close(self._signer.stamp)
+        self._heard.close(self._verifier.newest)
         if found := self.summary():
             log.info("signing: %s", found)
 

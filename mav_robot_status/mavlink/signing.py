@@ -5,6 +5,9 @@ verified stamp later than ours advances ours, however far, and ours never goes b
 advances all others. At the end of the 48 bits (the year 2104) only a new key helps.
 
 A frame has no effect before its signature is verified: a forged frame neither advances the time nor creates a stream.
+
+A signature proves who sent a frame, not when. So after a restart the first frame of each stream must be newer than all
+that its sender said before. And the newest stamp of a sender, on any link id, is a clock: it shows how late a frame is.
 """
 
 from __future__ import annotations
@@ -33,6 +36,10 @@ MAX_STREAMS: Final = 1024
 SHORTEST: Final = 25
 """Bytes of a signed frame without payload: header 10, CRC 2, signature block 13."""
 
+Stamps = Mapping[tuple[int, int], int]
+"""The newest stamp of each sender (system, component)."""
+NO_STAMPS: Final[Stamps] = {}
+
 RADIO: Final = frozenset({109, 166})  # RADIO_STATUS, RADIO: sent by a telemetry radio, which has no key
 UNSIGNED_IDS: Final[Mapping[str, Container[int]]] = {"none": (), "radio_status": RADIO, "all": range(1 << 24)}
 """The message ids that are accepted without a signature, by the value of the configuration option."""
@@ -50,8 +57,9 @@ class Verdict(IntEnum):
     REPLAYED = 4
     """Replayed, overtaken by a later frame of its stream, or received on two links."""
     STALE = 5
-    """A valid signature, but the frame is the first of its stream and more than a minute behind our stamp. This happens
-    with an autopilot that does not know the time, until it receives a signed frame of ours."""
+    """A valid signature, but the frame is the first of its stream, and more than a minute behind our stamp, or no newer
+    than what its sender said before our start. It is a replay, or of an autopilot that does not know the time, until
+    that receives a signed frame of ours."""
     TOO_MANY_STREAMS = 6
     """A valid signature, but MAX_STREAMS streams exist already."""
 
@@ -63,7 +71,7 @@ WORDS: Final[Mapping[Verdict, str]] = {
     Verdict.UNSIGNED: "refused unsigned",
     Verdict.FORGED: "forged or signed with another key",
     Verdict.REPLAYED: "replayed or late",
-    Verdict.STALE: "first and more than a minute behind our time",
+    Verdict.STALE: "first, and behind our time or what was heard before",
     Verdict.TOO_MANY_STREAMS: f"beyond {MAX_STREAMS} streams",
 }
 """Texts for the log: `12 verified, 3 refused unsigned`."""
@@ -124,16 +132,24 @@ class Signer:
 class Verifier:
     """Decides which frames to accept. One verifier serves all links, so a frame cannot be replayed on another."""
 
-    __slots__ = ("_is_same", "_signer", "_streams", "_unsigned", "counters")
+    __slots__ = ("_before", "_is_same", "_signer", "_streams", "_unsigned", "counters", "newest")
 
-    def __init__(self, signer: Signer, accept_unsigned: str = "radio_status") -> None:
-        """Shares the signer's key and time stamp. `accept_unsigned` is a key of UNSIGNED_IDS."""
+    def __init__(self, signer: Signer, accept_unsigned: str = "radio_status", before: Stamps = NO_STAMPS) -> None:
+        """Shares the signer's key and time stamp. `accept_unsigned` is a key of UNSIGNED_IDS.
+
+        `before` has the `newest` stamps of the run before. Our own stamp is beyond all of them, so that an autopilot
+        that takes over our time is newer than before.
+        """
         from hmac import compare_digest
 
         self._is_same = compare_digest
         self._signer = signer
         self._unsigned = UNSIGNED_IDS[accept_unsigned]
         self._streams: dict[bytes, int] = {}  # system, component, link id -> the last stamp
+        self._before = dict(before)
+        self.newest = dict(before)
+        """The newest verified stamp of each sender (system, component), on any link id, in this run or before it."""
+        signer.stamp = max(signer.stamp, *before.values(), 0)
         self.counters: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
         """The number of frames for each verdict."""
 
@@ -147,6 +163,21 @@ class Verifier:
         self.counters[verdict] += 1
         return verdict
 
+    def lag(self, frame: Frame) -> float:
+        """Seconds by which a VERIFIED frame is older than the newest one of its sender on any link id. Never below 0.0.
+
+        Call it after `judge`, before the next frame is judged. 0.0 for a frame without a signature, which has no time.
+        """
+        raw = frame.raw
+        if not is_signed(frame):
+            return 0.0
+        stamp = int.from_bytes(raw[-12:-6], "little")
+        return max(0, self.newest.get((raw[5], raw[6]), stamp) - stamp) / UNITS_PER_SECOND
+
+    def signs(self, ids: tuple[int, int]) -> bool:
+        """Whether this sender (system, component) was verified since our start."""
+        return self.newest.get(ids, -1) > self._before.get(ids, -1)
+
     def _unsigned_verdict(self, message_id: int) -> Verdict:
         return Verdict.LET_THROUGH if message_id in self._unsigned else Verdict.UNSIGNED
 
@@ -154,16 +185,17 @@ class Verifier:
         signer = self._signer
         if not self._is_same(signer.signature(raw[:-6]), raw[-6:]):
             return Verdict.FORGED
-        stream = raw[5:7] + raw[-13:-12]
+        stream, ids = raw[5:7] + raw[-13:-12], (raw[5], raw[6])
         stamp = int.from_bytes(raw[-12:-6], "little")
         last = self._streams.get(stream)
         if last is None:
-            if stamp + MAX_BEHIND < max(signer.stamp, stamp_at(unix_us)):
+            if stamp + MAX_BEHIND < max(signer.stamp, stamp_at(unix_us)) or stamp <= self._before.get(ids, -1):
                 return Verdict.STALE
             if len(self._streams) >= MAX_STREAMS:
                 return Verdict.TOO_MANY_STREAMS
         elif stamp <= last:
             return Verdict.REPLAYED
         self._streams[stream] = stamp
+        self.newest[ids] = max(self.newest.get(ids, 0), stamp)
         signer.stamp = max(signer.stamp, stamp)
         return Verdict.VERIFIED

@@ -118,6 +118,34 @@ def test_an_autopilot_without_the_time_learns_it_from_us(gateway: StartGateway, 
     assert gate.stop() == 0
 
 
+def test_what_was_recorded_before_a_restart_does_not_speak_for_a_silent_vehicle(
+    gateway: StartGateway, wire: OpenWire, key_file: Path
+) -> None:
+    gate = gateway("udpin:127.0.0.1:0", "--signing-key", str(key_file))
+    rover = wire(gate.address)
+    signing(rover.mav)
+    recorded = []
+    for _ in range(5):
+        recorded.append(heartbeat(armed=False).pack(rover.mav))
+        rover.send(recorded[-1])
+    gate.wait_for(lambda s: s["drives_powered"] is False)
+    assert gate.stop() == 0
+    again = gateway("udpin:127.0.0.1:0", "--signing-key", str(key_file))
+    elsewhere = wire(again.address)
+    for data in recorded:
+        elsewhere.send(data)
+    healing = elsewhere.wait_for("HEARTBEAT")  # the answer to a vehicle that is behind
+    assert again.lines == []
+    rover = wire(again.address)  # armed meanwhile
+    signing(rover.mav)
+    rover.mav.signing.timestamp = int.from_bytes(healing.data[-12:-6], "little")
+    rover.beat(armed=True)
+    again.wait_for(lambda s: s["drives_powered"] is True)
+    assert not any(line.status["drives_powered"] is False for line in again.lines)
+    assert again.stop() == 0
+    assert any("signing:" in line and "behind our time or what was heard before" in line for line in again.log)
+
+
 def test_an_unsigned_link_may_not_command_us(gateway: StartGateway, wire: OpenWire, key_file: Path) -> None:
     config = key_file.with_name("config.yaml")
     config.write_text(f"signing: {{key_file: {key_file}, accept_unsigned: all}}\n")

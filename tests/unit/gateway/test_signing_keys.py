@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from mav_robot_status.errors import UsageError
-from mav_robot_status.gateway.signing_keys import RESERVE, StampStore, read_key, stamp_path
+from mav_robot_status.gateway.signing_keys import RESERVE, HeardStore, StampStore, read_key, stamp_path
 from mav_robot_status.mavlink.definitions import Heartbeat
 from mav_robot_status.mavlink.encode import encode
-from mav_robot_status.mavlink.signing import MAX_STAMP, UNITS_PER_SECOND, Signer, stamp_at
+from mav_robot_status.mavlink.signing import MAX_STAMP, MAX_STREAMS, UNITS_PER_SECOND, Signer, stamp_at
 
 SECRET = "c0ffee" + "0123456789ABCDEFabcdef0123456789" + "42" * 13
 NOW = 1_795_200_547_123_456  # us since 1970
@@ -247,7 +247,7 @@ def test_the_event_loop_does_not_wait_for_the_disk(path: Path, monkeypatch: pyte
 
 
 def test_a_hanging_disk_does_not_delay_shutdown(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mav_robot_status.gateway.signing_keys.PATIENCE", 0.01)
+    monkeypatch.setattr("mav_robot_status.gateway.state_file.PATIENCE", 0.01)
     store = StampStore(path)
     store.start(NOW)
     freed = threading.Event()
@@ -256,7 +256,7 @@ def test_a_hanging_disk_does_not_delay_shutdown(path: Path, monkeypatch: pytest.
     store.close(STAMP + RESERVE)
     assert on_disk(path) == STAMP + RESERVE
     freed.set()
-    monkeypatch.setattr("mav_robot_status.gateway.signing_keys.PATIENCE", 10.0)
+    monkeypatch.setattr("mav_robot_status.gateway.state_file.PATIENCE", 10.0)
     assert store.settle()
 
 
@@ -268,7 +268,7 @@ def test_an_unwritable_directory_is_logged_once(tmp_path: Path, caplog: pytest.L
         store.keep(STAMP + second * UNITS_PER_SECOND)
     store.close(STAMP + 10_000_000)
     assert [record.getMessage() for record in caplog.records] == [
-        f"{tmp_path}/file/a.stamp: cannot read the last signing time stamp: Not a directory; "
+        f"{tmp_path}/file/a.stamp: cannot read the signing time stamp: Not a directory; "
         "signing continues with the clock alone"
     ]
 
@@ -306,3 +306,97 @@ def test_nothing_is_written_after_the_last_possible_timestamp(path: Path) -> Non
     store.keep(MAX_STAMP)
     store.settle()
     assert not path.exists()
+
+
+# the timestamps that were heard
+
+HEARD = {(1, 1): STAMP, (1, 191): STAMP + 7, (255, 190): 0}
+
+
+@pytest.fixture
+def heard(tmp_path: Path) -> Path:
+    return tmp_path / "state" / "a.heard"
+
+
+def kept(path: Path, newest: dict[tuple[int, int], int]) -> None:
+    """One run of the gateway."""
+    store = HeardStore(path)
+    store.start()
+    store.close(newest)
+
+
+def test_what_was_heard_survives_a_restart(heard: Path) -> None:
+    kept(heard, HEARD)
+    assert HeardStore(heard).start() == HEARD
+    assert heard.stat().st_mode & 0o777 == 0o600
+
+
+def test_before_the_first_run_nothing_was_heard(heard: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert HeardStore(heard).start() == {}
+    assert not caplog.records
+
+
+def test_what_was_heard_is_written_every_two_seconds_if_it_has_changed(heard: Path) -> None:
+    store = HeardStore(heard)
+    written = []
+    for tick in range(100):  # ten seconds, and changes in the first five
+        store.keep({(1, 1): min(tick, 50)}, tick / 10)
+        assert store._file.settle()
+        if heard.exists():
+            written.append((tick, HeardStore(heard).start()[1, 1]))
+            heard.unlink()
+    assert written == [(0, 0), (20, 20), (40, 40), (60, 50)]
+
+
+def test_the_loop_does_not_wait_for_the_write_of_what_was_heard(heard: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = HeardStore(heard)
+    freed, calls, replace = threading.Event(), [], os.replace
+
+    def hang(*paths: Path) -> None:
+        calls.append(paths)
+        assert freed.wait(10)
+        replace(*paths)
+
+    monkeypatch.setattr(os, "replace", hang)
+    for second in range(1000):
+        store.keep({(1, 1): second}, float(second))
+    assert len(calls) <= 1
+    freed.set()
+    assert store._file.settle()
+    store.close({(1, 1): 1000})
+    assert HeardStore(heard).start() == {(1, 1): 1000}
+
+
+def test_of_too_many_senders_those_heard_last_are_kept(heard: Path) -> None:
+    kept(heard, {(number // 250, number % 250): STAMP + number for number in range(3 * MAX_STREAMS)})
+    found = HeardStore(heard).start()
+    assert (len(found), min(found.values())) == (MAX_STREAMS, STAMP + 2 * MAX_STREAMS)
+
+
+def damaged(data: bytes) -> list[bytes]:
+    """Every file with one flipped bit, and every file that ends early."""
+    flipped = [data[:at] + bytes((data[at] ^ 1 << at % 8,)) + data[at + 1 :] for at in range(len(data))]
+    return [*flipped, *(data[:end] for end in range(len(data)))]
+
+
+def test_a_damaged_list_counts_as_none_and_is_logged_once(heard: Path, caplog: pytest.LogCaptureFixture) -> None:
+    kept(heard, HEARD)
+    for data in [*damaged(heard.read_bytes()), b"\xff" * 100_000, b"0 0\n1"]:
+        heard.write_bytes(data)
+        caplog.clear()
+        store = HeardStore(heard)
+        assert store.start() == store.start() == {}
+        assert len(caplog.records) == 1
+    assert "this is not a list of the time stamps heard; frames recorded before this start are" in caplog.text
+
+
+def test_a_list_that_cannot_be_written_is_logged_once(heard: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (heard / "in the way").mkdir(parents=True)
+    store = HeardStore(heard)
+    assert store.start() == {}
+    for second in range(100):
+        store.keep({(1, 1): second}, float(second))
+        assert store._file.settle()
+    store.close({(1, 1): 100})
+    assert len(caplog.records) == 1
+    assert os.listdir(heard.parent) == ["a.heard"]

@@ -378,3 +378,105 @@ def test_the_text_of_a_frame_is_covered() -> None:
     template = frame_of(data)
     changed = data.replace(b"mag", b"gyr")
     assert verifier().judge(template._replace(raw=changed), NOW) is Verdict.FORGED
+
+
+# after a restart
+
+
+def restarted(by: Verifier, stamp: int = 0) -> Verifier:
+    """The verifier of the next run."""
+    return Verifier(Signer(KEY, 192, stamp), before=by.newest)
+
+
+def test_what_was_recorded_before_a_restart_is_stale_after_it() -> None:
+    first = verifier()
+    recorded = [signed(STAMP + number, link_id=number % 2) for number in range(6)]
+    assert [judged(first, data) for data in recorded] == [Verdict.VERIFIED] * 6
+    again = restarted(first)
+    assert [judged(again, data) for data in recorded] == [Verdict.STALE] * 6
+    assert judged(again, signed(STAMP + 6, link_id=0)) is Verdict.VERIFIED
+    assert [judged(again, data) for data in recorded[1::2]] == [Verdict.STALE] * 3  # on the other link id
+
+
+def test_a_frame_that_was_kept_back_before_a_restart_is_stale_if_its_vehicle_said_more_since() -> None:
+    first = verifier()
+    kept_back = signed(STAMP + 1, link_id=1)
+    judged(first, signed(STAMP + 2, link_id=0))
+    assert judged(restarted(first), kept_back) is Verdict.STALE
+
+
+def test_other_senders_are_not_held_against_the_stamps_of_one() -> None:
+    first = verifier()
+    judged(first, signed(STAMP + 10))
+    again = restarted(first)
+    assert judged(again, signed(STAMP + 1, component=2)) is Verdict.VERIFIED
+    assert judged(again, signed(STAMP + 1, system=2)) is Verdict.VERIFIED
+
+
+def test_an_autopilot_that_is_behind_its_last_stamp_is_verified_after_our_frame() -> None:
+    first = verifier()
+    judged(first, signed(STAMP + MAX_BEHIND))
+    ours = Signer(KEY, 192)  # our own file is lost, and the clock stands still
+    again = Verifier(ours, before=first.newest)
+    assert judged(again, signed(STAMP)) is Verdict.STALE
+    ours.sign(unsigned(), NOW)
+    assert judged(again, signed(ours.stamp + 1)) is Verdict.VERIFIED
+
+
+def test_the_newest_stamp_survives_a_run_in_which_its_vehicle_is_silent() -> None:
+    first = verifier()
+    judged(first, signed(STAMP + 5))
+    assert judged(restarted(restarted(first)), signed(STAMP + 5)) is Verdict.STALE
+
+
+# how late a frame is
+
+
+def test_a_frame_is_as_late_as_the_newest_one_of_its_sender_on_any_link() -> None:
+    by = verifier()
+    found = []
+    for stamp, link_id in ((1000, 0), (0, 1), (51_000, 0), (50_000, 0), (1001, 1), (51_001, 1)):
+        frame = frame_of(signed(STAMP + stamp, link_id=link_id))
+        found.append((by.judge(frame, NOW), by.lag(frame)))
+    assert found == [
+        (Verdict.VERIFIED, 0.0),
+        (Verdict.VERIFIED, 0.01),
+        (Verdict.VERIFIED, 0.0),
+        (Verdict.REPLAYED, 0.01),
+        (Verdict.VERIFIED, 0.49999),
+        (Verdict.VERIFIED, 0.0),
+    ]
+
+
+def test_each_sender_has_a_clock_of_its_own() -> None:
+    by = verifier()
+    judged(by, signed(STAMP + 500_000, system=2))
+    judged(by, signed(STAMP + 500_000, component=2))
+    frame = frame_of(signed(STAMP))
+    assert (by.judge(frame, NOW), by.lag(frame)) == (Verdict.VERIFIED, 0.0)
+
+
+def test_a_forged_frame_makes_no_other_late() -> None:
+    by = verifier()
+    honest = frame_of(signed(STAMP))
+    by.judge(honest, NOW)
+    assert judged(by, signed(MAX_STAMP, key=OTHER_KEY, link_id=1)) is Verdict.FORGED
+    assert by.lag(honest) == 0.0
+
+
+def test_a_frame_without_a_signature_has_no_lag() -> None:
+    by = verifier(accept_unsigned="all")
+    judged(by, signed(STAMP))
+    assert by.lag(frame_of(unsigned())) == by.lag(radio_status()) == 0.0
+
+
+def test_who_signs_is_known_from_the_first_verified_frame_of_this_run_on() -> None:
+    first = verifier()
+    assert not first.signs((1, 1))
+    judged(first, signed(STAMP))
+    assert (first.signs((1, 1)), first.signs((1, 2))) == (True, False)
+    again = restarted(first)
+    judged(again, signed(STAMP))
+    assert not again.signs((1, 1))
+    judged(again, signed(STAMP + 1))
+    assert again.signs((1, 1))

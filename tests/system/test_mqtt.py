@@ -6,6 +6,7 @@ import contextlib
 import functools
 import json
 import os
+import random
 import re
 import select
 import shutil
@@ -22,6 +23,7 @@ from typing import Any
 import pytest
 
 from mav_robot_status.publishers.mqtt.robot import WINDOW
+from mav_robot_status.publishers.mqtt.spool import Event, Spool
 from mav_robot_status.testing import ardurover
 
 from ..deadline import SOON, Deadline, allow, in_time, wait_until
@@ -527,6 +529,51 @@ def test_a_gateway_that_is_killed_with_a_full_disk_keeps_its_events(
         heard.wait(lambda: sessions(heard) and len(sessions(heard)[0]) >= len(killed.told), 20)
         assert sessions(heard)[0][: len(killed.told)] == killed.told
         assert any("cannot write events to" in line for line in killed.log), killed.log
+
+
+def large_spool(path: Path) -> None:
+    """9 MB of events that wait: more than SQLite's cache."""
+    spool = Spool(str(path), 1 << 30, 1e9)
+    for place in range(1, 20_001):
+        spool.add(Event(place, ROBOT, time.time(), json.dumps({"id": f"old-{place}", "rest": "x" * 420})))
+        if place % 5000 == 0:
+            spool.flush(0.0, time.time())
+    spool.close(0.0, time.time())
+
+
+def overwrite_third_quarter(path: Path) -> None:
+    size = path.stat().st_size
+    with path.open("r+b") as file:
+        file.seek(size // 2)
+        file.write(random.Random(1).randbytes(size // 4))
+
+
+@pytest.mark.parametrize("running", [False, True], ids=["before the start", "while it runs"])
+def test_a_damaged_spool_is_set_aside_and_statuses_go_on(
+    broker: Start, listener: Start, started: Start, autopilot: Start, tmp_path: Path, running: bool
+) -> None:
+    path = tmp_path / "spool.sqlite"
+    large_spool(path)
+    at = broker()
+    if running:
+        at.stop()
+    else:
+        overwrite_third_quarter(path)
+    gate = started(at.url)
+    autopilot(ardurover.READY, gate.address)
+    if running:
+        overwrite_third_quarter(path)
+        at.start()
+    heard = listener(at.port)
+    heard.wait_for(lambda h: h.what == "status" and json.loads(h.text)["mode"] != "UNKNOWN", 20)
+    heard.wait_for(lambda h: h.what == "events" and '"old-' not in h.text, 20)
+    gate.wait_for_log(
+        r"spool.sqlite is damaged \(.*\): it is now .*\.broken, and a new one is used; .* are not delivered"
+    )
+    assert (tmp_path / "spool.sqlite.broken").stat().st_size > 9_000_000
+    assert gate.stop() == 0
+    assert len([line for line in gate.log if "damaged" in line]) == 1
+    assert not any("Traceback" in line for line in gate.log)
 
 
 def test_a_hanging_disk_does_not_delay_the_gateway(

@@ -3,6 +3,8 @@ from __future__ import annotations
 import json
 import logging
 import os
+import random
+import resource
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +15,8 @@ from hypothesis import strategies as st
 
 from mav_robot_status.errors import LinkError
 from mav_robot_status.publishers.mqtt import spool as module
-from mav_robot_status.publishers.mqtt.spool import CLOCK_SET, OVERHEAD, RETRY, SWEEP, Event, Spool
+from mav_robot_status.publishers.mqtt.spool import CLOCK_SET, MOST_REPLACED, OVERHEAD, RETRY, SWEEP, Event, Spool
+from mav_robot_status.publishers.mqtt.spool_file import connect
 
 
 @pytest.fixture
@@ -112,7 +115,180 @@ def test_a_corrupt_file_is_renamed_and_replaced(path: str, caplog: pytest.LogCap
     assert texts(made) == ["a"]
     made.close(0.0, 0.0)
     assert Path(f"{path}.broken").read_bytes().startswith(b"no database")
-    assert "is corrupt" in caplog.text
+    assert f"{path} is damaged (file is not a database): it is now {path}.broken" in caplog.text
+
+
+def large(path: str, count: int = 1000) -> None:
+    """A spool of some hundred kilobytes, as a gateway that has ended leaves it."""
+    made = Spool(path, 1 << 30, 1e9)
+    for number in range(count):
+        add(made, f"{number:05}" + "x" * 450, "rs"[number % 2])
+        if number % 5000 == 0:
+            made.flush(0.0, 0.0)
+    made.close(0.0, 0.0)
+
+
+def overwrite(path: str, data: bytes = b"", start: float = 0.5, end: float = 0.75) -> None:
+    """Overwrite the third quarter, or another part."""
+    with open(path, "r+b") as file:
+        size = os.path.getsize(path)
+        first, length = int(size * start), int(size * (end - start))
+        file.seek(first)
+        file.write((data or random.Random(1).randbytes(length))[:length])
+
+
+def test_a_file_that_was_damaged_before_the_start_is_set_aside(path: str, caplog: pytest.LogCaptureFixture) -> None:
+    large(path)
+    caplog.clear()
+    overwrite(path)
+    damaged = Path(path).read_bytes()
+    made = Spool(path, 1 << 30, 1e9)
+    fill(made, "a")
+    assert (texts(made), made.waiting, made.failed) == (["a"], 1, False)
+    made.close(0.0, 0.0)
+    assert Path(f"{path}.broken").read_bytes() == damaged
+    assert [record.getMessage() for record in caplog.records][:-1] == [
+        f"mqtt: {path} is damaged (database disk image is malformed): it is now {path}.broken, and a new one is used; "
+        "the events that waited in it are not delivered"
+    ]
+    again = Spool(path, 1 << 30, 1e9)
+    assert texts(again) == ["a"]
+    again.close(0.0, 0.0)
+
+
+def test_a_file_that_is_damaged_while_it_is_used_is_set_aside(path: str, caplog: pytest.LogCaptureFixture) -> None:
+    large(path, 20_000)  # more than SQLite's cache
+    caplog.clear()
+    made = Spool(path, 1 << 30, 1e9)
+    for event in made.after("r", 0, 10):
+        made.done(event)
+    made.flush(0.0, 0.0)
+    overwrite(path)
+    assert made.waiting == 19_990
+    add(made, "in memory")
+    reached, place = 0, 0
+    while events := made.after("r", place, 100):
+        reached, place = reached + len(events), events[-1].place
+    assert 10 <= reached < 9_000
+    assert texts(made) == ["in memory"]
+    fill(made, "later", now=1.0)
+    assert (texts(made), made.waiting, made.last) == (["in memory", "later"], 2, 20_002)
+    assert made.dropped == {"r": 9_990, "s": 10_000}
+    assert [record.getMessage() for record in caplog.records] == [
+        f"mqtt: {path} is damaged (database disk image is malformed): it is now {path}.broken, and a new one is used; "
+        "19990 events that waited in it are not delivered"
+    ]
+    made.close(2.0, 0.0)
+    again = Spool(path, 1 << 30, 1e9)
+    assert (texts(again), again.dropped["s"]) == (["in memory", "later"], 10_000)
+    again.close(0.0, 0.0)
+
+
+def test_of_two_damaged_files_the_last_one_is_kept_with_its_log(path: str) -> None:
+    for number in range(2):
+        large(path)
+        overwrite(path, b"%d" % number * 1_000_000)
+        Path(f"{path}-wal").write_bytes(b"%d" % number)
+        Spool(path, 1 << 30, 1e9).close(0.0, 0.0)
+    files = sorted(os.listdir(os.path.dirname(path)))
+    assert [name.removeprefix("spool.sqlite") for name in files if "broken" in name] in (
+        [".broken"],
+        [".broken", ".broken-wal"],
+    )
+    assert b"1111" in Path(f"{path}.broken").read_bytes()
+
+
+@pytest.mark.parametrize("at", range(100))
+def test_no_byte_of_the_header_keeps_a_gateway_from_its_spool(path: str, at: int) -> None:
+    large(path, 10)
+    with open(path, "r+b") as file:
+        file.seek(at)
+        byte = file.read(1)[0]
+        file.seek(at)
+        file.write(bytes((byte ^ 0x55,)))
+    made = Spool(path, 1 << 30, 1e9)
+    fill(made, "a", robot="new")
+    fill(made, now=1.0)
+    assert texts(made, "new") == ["a"]
+    assert not made.failed
+    made.close(2.0, 0.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    start=st.floats(0.0, 1.0),
+    length=st.sampled_from([1, 20, 4096, 40_000]),
+    piece=st.one_of(st.binary(min_size=1, max_size=20), st.just(b"\0")),
+    running=st.booleans(),
+)
+def test_no_damage_ends_a_spool(
+    tmp_path_factory: pytest.TempPathFactory, start: float, length: int, piece: bytes, running: bool
+) -> None:
+    path = str(tmp_path_factory.mktemp("spool") / "s")
+    large(path, 300)
+    made = Spool(path, 1 << 30, 100.0) if running else None
+    if made:
+        made._db.execute("PRAGMA cache_size = 0")
+    overwrite(path, piece * length, start, min(1.0, start + length / os.path.getsize(path)))
+    made = made or Spool(path, 1 << 30, 100.0)
+    for number in range(4):
+        for robot in {*made.robots(), "r"}:
+            for event in made.after(robot, 0, 50):
+                made.done(event)
+        add(made, "new", "n")
+        made.flush(number * SWEEP, CLOCK_SET + number * SWEEP)
+    assert "new" in texts(made, "n")
+    made.close(100.0, CLOCK_SET)
+    Spool(path, 1 << 30, 100.0).close(0.0, 0.0)
+
+
+def test_a_file_that_is_damaged_again_and_again_is_replaced_by_memory(
+    path: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    made = Spool(path, 10_000, 100.0)
+    fill(made, "a", "b")
+    for _ in range(MOST_REPLACED + 3):
+        made._replace(sqlite3.DatabaseError("malformed"))
+        if not made._in_memory:
+            fill(made, "lost")
+    fill(made, "c")
+    assert (texts(made), made.settled) == (["c"], made.last)
+    assert "it cannot be replaced (it was damaged too often), and events wait in memory" in caplog.text
+    made.close(0.0, 0.0)
+
+
+def test_on_a_full_disk_a_new_spool_is_in_memory(
+    path: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def full(name: str) -> sqlite3.Connection:
+        if name == path:
+            raise sqlite3.OperationalError("database or disk is full")
+        return connect(name)
+
+    monkeypatch.setattr(module, "connect", full)
+    made = Spool(path, 10_000, 100.0)
+    fill(made, "a")
+    assert (texts(made), made.waiting, made.settled) == (["a"], 1, 0)  # the journal keeps it
+    assert [r.getMessage() for r in caplog.records] == [
+        f"mqtt: {path}: database or disk is full; events wait in memory until the next start"
+    ]
+    made.close(0.0, 0.0)
+
+
+def test_a_limit_on_the_size_of_files_loses_no_event_while_there_is_memory(spool: Spool, path: str) -> None:
+    fill(spool, "a")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (os.path.getsize(f"{path}-wal"), before[1]))
+    try:
+        for number in range(5):
+            fill(spool, f"{number}" * 1000, now=number * 2 * RETRY)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert spool.failed
+    assert len(texts(spool)) == 6
+    spool.flush(100.0, 0.0)
+    assert (spool.failed, len(texts(spool)), spool.settled) == (False, 6, 6)
+    assert not os.path.exists(f"{path}.broken")
 
 
 def test_the_oldest_events_are_dropped_beyond_the_size_limit(path: str, caplog: pytest.LogCaptureFixture) -> None:

@@ -7,6 +7,7 @@ short file to gigabytes.
 from __future__ import annotations
 
 import os
+from stat import S_ISDIR, S_ISFIFO, S_ISREG
 from typing import Final, NoReturn
 
 import yaml
@@ -20,6 +21,9 @@ MAX_VALUES: Final = 20_000
 """Keys and values of a file: PyYAML needs about a kilobyte and 20 us for each."""
 MAX_NUMBER: Final = 64
 """Characters of a number. The time to read one grows with the square of its length."""
+
+OPEN: Final = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")
+"""The paths of what a shell has opened for us, as in `check-config <(command)`."""
 
 _TAG: Final = "tag:yaml.org,2002:"
 _CONSTRUCTED: Final = {_TAG + name for name in ("null", "bool", "int", "float")}
@@ -87,6 +91,10 @@ def load_document(path: str | os.PathLike[str]) -> Node:
     """The one document of a file; an empty file is an empty mapping. Raises ConfigError."""
     name = os.fspath(path)
     try:
+        mode = os.stat(path).st_mode
+        if not (S_ISREG(mode) or S_ISDIR(mode) or name.startswith(OPEN)):  # it may hold nothing, and never end
+            what = "a pipe" if S_ISFIFO(mode) else "a device"
+            raise ConfigError(f"{name}: this is {what}: a configuration is a file, or /dev/stdin")
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
     except OSError as error:

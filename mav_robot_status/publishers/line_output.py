@@ -1,17 +1,18 @@
 """Lines to a file or to standard output. Never blocks. An output that fails is tried again, and never has half a line.
 
-A write can fail at any time: no room (ENOSPC, EFBIG, EDQUOT), a defect (EIO), a file system that went away, a FIFO
-whose reader left. While it fails, only the latest line of each robot is held; the others are counted. Only the end of
-the reader of standard output is an error, because nobody reads the program then.
+A write can fail at any time: no room (ENOSPC, EFBIG, EDQUOT), a defect (EIO), a file system that went away, a FIFO that
+nobody reads yet, or whose reader left. While it fails, only the latest line of each robot is held; the others are
+counted. Only the end of the reader of standard output is an error, because nobody reads the program then.
 """
 
 from __future__ import annotations
 
+import errno
 import logging
 import math
 import os
 import select
-from stat import S_ISREG
+from stat import S_ISFIFO, S_ISREG
 from typing import TYPE_CHECKING, Final
 
 from ..errors import LinkError
@@ -32,6 +33,7 @@ PACE: Final = 60.0  # s between two log lines about failures
 GONE: Final = select.POLLERR | select.POLLHUP | select.POLLNVAL
 FLAGS: Final = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK
 MODE: Final = 0o644
+UNREAD: Final = "nobody reads this pipe yet"
 CHUNK: Final = 1 << 16  # bytes written at once on replay
 
 
@@ -39,7 +41,7 @@ class LineOutput:
     """Writes whole lines. Raises BrokenPipeError after the reader of standard output has closed its end."""
 
     def __init__(self, path: str, stdout: TextIO) -> None:
-        """Open the output; `-` is standard output. Raises LinkError if that fails."""
+        """Open the output; `-` is standard output. Raises LinkError if that fails; a FIFO may have no reader yet."""
         self._path = None if path == "-" else path
         self.text = "standard output" if path == "-" else path
         """The name of the output in messages."""
@@ -63,7 +65,9 @@ class LineOutput:
         try:
             self._open(descriptor)
         except OSError as error:
-            raise LinkError(f"cannot write JSON lines to {self.text}: {error.strerror}") from None
+            if not _is_unread(path, error):
+                raise LinkError(f"cannot write JSON lines to {self.text}: {error.strerror}") from None
+            self._fail(UNREAD)
 
     @property
     def queued(self) -> int:
@@ -205,7 +209,7 @@ class LineOutput:
             if self._path is not None:
                 self._open()
         except OSError as error:
-            self._fail(error.strerror or str(error))
+            self._fail(UNREAD if _is_unread(self.text, error) else error.strerror or str(error))
             return
         self._write()
 
@@ -239,7 +243,8 @@ class PatientLineOutput:
             if self._owned:
                 self._fd = os.open(path, FLAGS, MODE)
         except OSError as error:
-            raise LinkError(f"cannot write JSON lines to {self.text}: {error.strerror}") from None
+            why = UNREAD if _is_unread(path, error) else error.strerror
+            raise LinkError(f"cannot write JSON lines to {self.text}: {why}") from None
         if self._owned and _ends_within_a_line(path, self._fd):
             self._lines.append(b"\n")
 
@@ -281,6 +286,11 @@ class PatientLineOutput:
                 raise
             except OSError as error:
                 raise LinkError(f"cannot write JSON lines to {self.text}: {error.strerror}") from None
+
+
+def _is_unread(path: str, error: OSError) -> bool:
+    """Whether the file cannot be opened because it is a FIFO without a reader."""
+    return error.errno == errno.ENXIO and S_ISFIFO(os.stat(path).st_mode)
 
 
 def _ends_within_a_line(path: str, descriptor: int) -> bool:

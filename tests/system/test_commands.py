@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -54,6 +55,16 @@ def test_check_config_gives_the_place_of_an_error(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"mav-robot-status: {config}:3:3: ")
     assert "heartbeat_timeout" in done.stderr
+
+
+def test_check_config_does_not_wait_for_a_pipe(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    done = run("check-config", str(pipe))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"mav-robot-status: {pipe}: this is a pipe: a configuration is a file, or /dev/stdin\n"
+    piped = run("check-config", "/dev/stdin", input="links: [udp:127.0.0.1:14550]\n")
+    assert piped.returncode == 0
 
 
 def test_dialect_writes_xml_and_lua(tmp_path: Path) -> None:

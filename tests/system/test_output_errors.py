@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import signal
 import subprocess
@@ -93,3 +94,18 @@ def test_standard_output_on_a_full_disk_does_not_end_the_gateway(wire: OpenWire)
             process.kill()
     assert process.returncode == 0
     assert b"cannot write JSON lines to standard output: No space left on device" in log
+
+
+def test_a_pipe_that_nobody_reads_yet_gets_lines_when_somebody_does(
+    gateway: StartGateway, wire: OpenWire, tmp_path: Path
+) -> None:
+    path = tmp_path / "lines"
+    os.mkfifo(path)
+    gate = gateway("udpin:127.0.0.1:0", "--json", str(path))
+    gate.wait_for_log("cannot write JSON lines to .*: nobody reads this pipe yet; trying again")
+    wire(gate.address).beating()
+    for _ in range(2):  # the second reader comes after the first has left
+        reader = subprocess.Popen(["head", "-n", "3", str(path)], stdout=subprocess.PIPE, text=True)
+        text, _ = reader.communicate(timeout=allow(GROWS_AGAIN))
+        assert [json.loads(line)["link"]["state"] for line in text.splitlines()] == ["CONNECTED"] * 3
+    assert gate.stop() == 0

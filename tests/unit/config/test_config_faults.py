@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mav_robot_status.config import load
-from mav_robot_status.config.document import MAX_BYTES, parse_document
+from mav_robot_status.config.document import parse_document
 from mav_robot_status.config.reader import build
 from mav_robot_status.errors import ConfigError
 
@@ -310,8 +311,20 @@ def test_the_error_gives_the_position_of_invalid_utf_8(tmp_path: Path) -> None:
 
 
 def test_an_endless_file_is_not_read_to_its_end() -> None:
-    with pytest.raises(ConfigError, match=f"/dev/zero:1:1: larger than {MAX_BYTES} bytes"):
+    with pytest.raises(ConfigError, match="/dev/zero: this is a device: a configuration is a file, or /dev/stdin"):
         load("/dev/zero")
+
+
+def test_a_pipe_is_no_configuration_unless_a_shell_has_opened_it(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(ConfigError, match=f"{pipe}: this is a pipe: a configuration is a file, or /dev/stdin"):
+        load(pipe)
+    read, write = os.pipe()
+    os.write(write, b"links: [udp:14550]")
+    os.close(write)
+    assert load(f"/dev/fd/{read}").links[0].url == "udp:14550"
+    os.close(read)
 
 
 def test_nested_aliases_cannot_grow_without_bound() -> None:

@@ -318,6 +318,32 @@ def test_a_file_that_ends_with_half_a_line_gets_a_newline_first(tmp_path: Path) 
         assert json.loads(line)["seq"] == 0
 
 
+def test_a_fifo_that_nobody_reads_yet_gets_lines_from_its_first_reader_on(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "fifo"
+    os.mkfifo(path)
+    publisher = to_file(path)
+    for turn in range(3):
+        assert not publisher.busy()
+        publisher.publish(MSG)
+        publisher.service(at(turn * RETRY_FAILED))
+    assert caplog.messages == [f"cannot write JSON lines to {path}: nobody reads this pipe yet; trying again"]
+    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    publisher.service(at(3 * RETRY_FAILED))
+    publisher.publish(MSG)
+    assert [json.loads(line)["seq"] for line in os.read(reader, 1 << 16).splitlines()] == [2, 3]
+    assert caplog.messages[1:] == [f"writing {path} again; 2 lines are not in it"]
+    os.close(reader)
+    publisher.close()
+
+
+def test_a_replay_says_that_nobody_reads_its_fifo(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    with pytest.raises(LinkError, match="nobody reads this pipe yet"):
+        to_file(tmp_path / "fifo", patient=True)
+
+
 def test_a_fifo_whose_reader_leaves_waits_for_the_next_one(tmp_path: Path) -> None:
     path = tmp_path / "fifo"
     os.mkfifo(path)

@@ -37,16 +37,17 @@ class Screen:
         columns: int = 80,
         lines: int = 24,
         command: tuple[str, ...] = COMMAND,
+        told: bool = True,
         **environment: str,
     ) -> None:
-        """Start the command with these arguments."""
+        """Start the command with these arguments. With `told` false the terminal reports a size of 0 x 0."""
         self._master, self.terminal = pty.openpty()
         self.emulator = pyte.Screen(columns, lines)
         self._stream = pyte.ByteStream(self.emulator)
         self.raw = b""
         """Everything that was written to the terminal."""
         self._lock = threading.Lock()
-        self._set_size(columns, lines)
+        self._set_size(*((columns, lines) if told else (0, 0)))
         self.before = termios.tcgetattr(self.terminal)
         self._stop, self._marked = threading.Event(), threading.Event()
         self.process = subprocess.Popen(

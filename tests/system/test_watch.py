@@ -52,6 +52,19 @@ def row(screen: Screen, name: str = "1.1") -> str:
 # -- what is seen ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("command", [COMMAND, WITHOUT_TEXTUAL], ids=["Textual", "plain"])
+def test_a_terminal_that_does_not_know_its_size_is_used_as_one_of_80_by_24(
+    watch: Callable[..., Screen], wire: Callable[..., Wire], command: tuple[str, ...]
+) -> None:
+    """Serial consoles, `docker exec -t` and some build machines report 0 x 0."""
+    screen = watch(command=command, told=False)
+    wire(to=address(screen)).beating()
+    screen.wait_for(lambda lines: "▬ CANNOT MOVE     ☺ MANUAL ? unk  ○ off" in row(screen), "a disarmed rover")
+    screen.wait_for(lambda lines: lines[-1] != "", "the last line")
+    screen.process.send_signal(signal.SIGINT)
+    assert screen.process.wait(allow(SOON)) == 0
+
+
 def test_arming_is_shown_within_a_second(watch: Callable[..., Screen], wire: Callable[..., Wire]) -> None:
     screen = watch()
     rover = wire(to=address(screen)).beating()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import locale
 import os
+import shutil
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -13,7 +14,7 @@ from .log_lines import LogLines
 from .robots import Source
 from .text import Signs
 
-__all__ = ["Source", "is_screen", "show"]
+__all__ = ["Source", "is_screen", "show", "terminal_size"]
 
 HINT = "Search, sorting, mouse: pip install 'mav-robot-status[watch]'; Ctrl-C: quit"
 NO_UTF8 = "Search, sorting and the mouse need a terminal with UTF-8; Ctrl-C: quit"
@@ -22,6 +23,12 @@ NO_UTF8 = "Search, sorting and the mouse need a terminal with UTF-8; Ctrl-C: qui
 def is_screen() -> bool:
     """Whether standard input and output are a terminal with a movable cursor."""
     return sys.stdin.isatty() and sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown", "")
+
+
+def terminal_size() -> os.terminal_size:
+    """The size of the terminal; 80 x 24 for one that reports none, as serial consoles do."""
+    size = shutil.get_terminal_size()
+    return os.terminal_size((size.columns or 80, size.lines or 24))  # Python 3.10 passes a 0 on
 
 
 def show(source: Source, footer: Callable[[], Sequence[str]] | None = None) -> int:

@@ -21,6 +21,7 @@ from textual.events import Click
 from textual.widgets import DataTable, Footer, Input, Static
 
 from ...language import TONES
+from . import terminal_size
 from .columns import COLUMNS, Column, cell, columns, name_of, sort_key
 from .details import changes, details, evidence, help_lines
 from .log_lines import LogLines
@@ -350,6 +351,9 @@ class Output(LinuxDriver):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._file = sys.__stdout__
+
+    def _get_terminal_size(self) -> tuple[int, int]:
+        return terminal_size()
 
 
 def run(source: Source, log: LogLines, signs: Signs) -> int:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import Final
 
+from . import terminal_size
 from .columns import Column, cell, columns, head
 from .details import details
 from .robots import Memory, Robot, Source, counts, in_order
@@ -70,10 +71,10 @@ def redraw(source: Source, signs: Signs, footer: Callable[[], Sequence[str]]) ->
     """Draw the table, and below it the lines of `footer`, until the source ends. A signal raises KeyboardInterrupt."""
     reader = _reader()
     memory, colours, drawn = Memory(), "NO_COLOR" not in os.environ, ""
-    _write("\n" * (os.get_terminal_size(1).lines - 1))  # what was on the screen can be scrolled back to
+    _write("\n" * (terminal_size().lines - 1))  # what was on the screen can be scrolled back to
     try:
         while not source.wait(PERIOD):
-            size = os.get_terminal_size(1)
+            size = terminal_size()
             robots = memory.robots(source.rows(), source.now())
             last: list[Line] = [(Span(signs.text(text), "bold"),) for text in footer()]
             text = frame(screen(source, robots, size, signs), last, size, colours)

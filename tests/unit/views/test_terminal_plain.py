@@ -11,6 +11,7 @@ import pytest
 
 from mav_robot_status.clock import later
 from mav_robot_status.publishers.board import Board
+from mav_robot_status.views.terminal import terminal_size
 from mav_robot_status.views.terminal.log_lines import KEPT, LogLines
 from mav_robot_status.views.terminal.plain import frame, print_changes, screen
 from mav_robot_status.views.terminal.text import Signs, Span
@@ -46,6 +47,18 @@ def test_a_screen_never_scrolls(columns: int, lines: int) -> None:
     rows = shown.removeprefix("\x1b[H").removesuffix("\x1b[J").replace("\x1b[K", "").split("\r\n")
     assert len(rows) == lines
     assert all(len(row) <= columns for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("reported", "used"), [((0, 0), (80, 24)), ((100, 0), (100, 24)), ((0, 50), (80, 50)), ((100, 50), (100, 50))]
+)
+def test_a_side_of_the_terminal_that_is_not_known_is_assumed(
+    monkeypatch: pytest.MonkeyPatch, reported: tuple[int, int], used: tuple[int, int]
+) -> None:
+    for name in ("COLUMNS", "LINES"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os, "get_terminal_size", lambda descriptor=1: os.terminal_size(reported))
+    assert terminal_size() == used
 
 
 def test_colours_are_those_of_the_tones() -> None:

@@ -1,7 +1,8 @@
 """Writes the tables of `docs/scoreboard.md`: `python docs/make_scoreboard.py [--list]`.
 
 It judges the status on the large set of recordings, which lies beside the checkout (tests/recorded/logs/README.md), by
-its own judge, `tools/score.py`. That takes some minutes. `--list` only prints the recordings of each family.
+its own judge, `tools/score.py`; the recordings over bad links by `tests/recorded/bad_link_verdicts.py`. That takes some
+minutes. `--list` only prints the recordings of each family.
 A slow test of `tests/recorded` compares the tables in the document with fresh ones.
 """
 
@@ -16,11 +17,16 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from typing import Any, Final
 
 DOCUMENT: Final = pathlib.Path(__file__).resolve().parent / "scoreboard.md"
 SHARED: Final = DOCUMENT.parents[2] / "shared"
 SCORE: Final = SHARED / "tools" / "score.py"
+sys.path.insert(0, str(DOCUMENT.parents[1]))  # for `tests`
+
+from tests.recorded.bad_link_verdicts import Recording, Verdicts  # noqa: E402
+from tests.recorded.bad_links import BAD_LINKS  # noqa: E402
 
 FAMILIES: Final = (
     ("ArduPilot with the applet", r".*-applet-"),
@@ -153,6 +159,24 @@ def without_output_watch(score: Score) -> Iterator[str]:
     yield from table(("without the watch", "checkpoints", *VERDICTS, "right %"), [*rows, row("all", score.all)])
 
 
+def over_bad_links(truth_file: pathlib.Path) -> dict[str, Verdicts]:
+    """The verdicts on a recording over each bad link."""
+    recording = Recording(truth_file.with_name(truth_file.name.replace(".truth.json", ".tlog")))
+    return {name: recording.over(name).verdicts() for name in BAD_LINKS}
+
+
+def bad_links(paths: Iterable[pathlib.Path]) -> Iterator[str]:
+    with ProcessPoolExecutor() as pool:
+        found = list(pool.map(over_bad_links, paths))
+    rows = []
+    for name in BAD_LINKS:
+        total = functools.reduce(Verdicts.plus, (verdicts[name] for verdicts in found))
+        change = f"{100 * (total.right / total.right_undamaged - 1):+.1f}"
+        rows.append([name, total.checkpoints, total.right, change, len(total.wrong), len(total.safe), total.safe_lines])
+    head = ("the link", "checkpoints", "right", "against undamaged %", "WRONG", 'of them "safe"', '"safe" lines')
+    yield from table(head, rows)
+
+
 @functools.cache
 def blocks() -> dict[str, str]:
     """The generated blocks of the document, by name."""
@@ -169,6 +193,7 @@ def blocks() -> dict[str, str]:
         "share by family": share_by_family(watched),
         "wrong": wrong(total),
         "without output watch": without_output_watch(together(unwatched.values())),
+        "bad links": bad_links(path for paths in families.values() for path in paths),
     }
     return {name: "\n".join(text) + "\n" for name, text in lines.items()}
 

@@ -22,15 +22,13 @@ from contextlib import contextmanager
 from functools import lru_cache
 from random import Random
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
-from unittest import mock
 
-from mav_robot_status.clock import Instant
+from mav_robot_status.clock import later
 from mav_robot_status.config import Config, LinkConfig
-from mav_robot_status.gateway.mavlink_hardware import MavlinkHardware
-from mav_robot_status.interface import LinkState, TriState
-from mav_robot_status.links.base import Received
 from mav_robot_status.mavlink import definitions as mav
-from mav_robot_status.mavlink.encode import enclose, encode
+from mav_robot_status.mavlink.encode import enclose
+
+from .air import START, Gateway, packed, says_safe
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,48 +50,22 @@ HIL: Final = 32
 """MAV_MODE_FLAG_HIL_ENABLED."""
 RAW_IMU: Final = 27
 """A message that no status needs."""
+SILENCE: Final = 0.9  # s
+RATE: Final = 10
+"""Frames a second that were lost in a longer silence: a vehicle goes on sending, so its numbers go on."""
 FAR: Final = 60
 """The least distance of the sequence numbers of the two senders."""
+BOOT: Final = 1.5
+"""Seconds from a boot to the first frame."""
+COPY: Final = 10.5
+"""Seconds after which a sender may use a number again."""
+SAME_BOOT: Final = 10.0
+"""Seconds within which two boots may be taken for one, if frames of a sender are late."""
 WORLD_STEPS: Final = 500
-START: Final = Instant(1000.0, 1_800_000_000_000_000)
 
 
 class UnsafeError(AssertionError):
     """A live robot was called safe."""
-
-
-class Air:
-    """A `Link` without a socket: `arrive` is what the gateway reads next."""
-
-    text = "the air"
-    stream = False
-    dropped = 0
-
-    def __init__(self, url: object = None) -> None:
-        self.waiting: list[Received] = []
-
-    def receive(self, limit: int = 64) -> list[Received]:
-        """What waits."""
-        pieces, self.waiting = self.waiting, []
-        return pieces
-
-    def fileno(self) -> int:
-        """No descriptor."""
-        return -1
-
-    def send(self, data: bytes, to: object = None) -> bool:
-        """Nobody listens."""
-        return True
-
-    def due(self) -> float:
-        """Never."""
-        return math.inf
-
-    def service(self, now: float) -> None:
-        """Nothing to do."""
-
-    def close(self) -> None:
-        """Nothing to close."""
 
 
 class Said(NamedTuple):
@@ -123,6 +95,10 @@ class Sender:
         self.forked = False
         """Whether a router copies its frames on all its ways. Else each way has its own count."""
         self.counts: dict[Any, int] = {}
+        self.starts_at = now
+        """It says nothing before: a boot takes time."""
+        self.spoke: dict[Any, float] = {}
+        """When it spoke last on each way."""
 
     def heartbeat(self) -> mav.Heartbeat:
         """What it says now."""
@@ -138,6 +114,10 @@ class World:
         self.now = START
         self.history: deque[str] = deque(maxlen=WORLD_STEPS + 1)
         self.senders = (Sender(TRUE_ONE, self.now.mono), Sender(OTHER, self.now.mono))
+        self._used: dict[Any, float] = {}
+        """When each sender used a number on a way last."""
+        self._boots = tuple({sender.booted} for sender in self.senders)
+        """All boots of each sender."""
         self._late: list[Said] = []
         self._order = 0
         self.restart()
@@ -147,12 +127,9 @@ class World:
     def restart(self) -> None:
         """The gateway restarts. It knows nothing of before."""
         self._newest, self._armed_at = -1, -math.inf
-        with mock.patch("mav_robot_status.gateway.endpoint.open_guarded", Air):
-            config = Config(links=(LinkConfig("udpin:127.0.0.1:1"),), requests="none")
-            self.hardware = MavlinkHardware(config, lambda: self.now)
-        (endpoint,) = self.hardware.hub.endpoints
-        self._air: Any = endpoint.link
-        (self._source,) = self.hardware.sources()
+        config = Config(links=(LinkConfig("udpin:127.0.0.1:1"),), requests="none")
+        self.gateway = Gateway(config, self.now)
+        self.hardware = self.gateway.hardware
 
     def wait(self, seconds: float) -> None:
         """Time passes, and late frames arrive."""
@@ -181,8 +158,7 @@ class World:
         sender = self.senders[who]
         for _ in range(count):
             for way in sender.ways[:1] if sender.forked else sender.ways:
-                self._air.waiting.append(Received(_unneeded(self._count(sender, way)), way))
-        self._source.receive(self.now, 64)
+                self.gateway.arrive(_unneeded(self._count(sender, way)), way)
 
     def arm(self, who: int, armed: bool) -> None:
         """A sender arms or disarms."""
@@ -207,16 +183,25 @@ class World:
         sender = self.senders[who]
         self._late = [said for said in self._late if said.who != who]
         heapq.heapify(self._late)
-        sender.booted, sender.armed, sender.counts = self.now.mono, False, {}
+        sender.booted, sender.armed, sender.counts = self._apart(who, self.now.mono), False, {}
+        sender.starts_at = self.now.mono + BOOT
 
     def exchange(self, kind: int, age: float) -> None:
         """Another vehicle takes the place of the true one, and continues its count."""
         true = self.senders[TRUE_ONE]
-        true.kind, true.booted = KINDS[kind], self.now.mono - age
+        true.kind, true.booted = KINDS[kind], self._apart(TRUE_ONE, self.now.mono - age)
 
     def copy(self, who: int) -> None:
         """The other sender becomes alike, or unlike, the true one in its kind."""
         self.senders[OTHER].kind = KINDS[who]
+
+    def _apart(self, who: int, booted: float) -> float:
+        """When a sender booted: not near any boot of the other one, which would prove by clock that they are one."""
+        others = self._boots[1 - who]
+        while any(abs(booted - other) <= SAME_BOOT for other in others):
+            booted -= SAME_BOOT
+        self._boots[who].add(booted)
+        return booted
 
     # the oracle
 
@@ -225,28 +210,24 @@ class World:
         if self.now.mono - self._armed_at >= WITHIN:
             return
         vehicle = self.hardware.vehicles.find(1, 1)
-        if vehicle is None or vehicle.handle.detail.link is not LinkState.CONNECTED:
-            return
-        status = vehicle.handle.status
-        if (
-            status.drives_powered is TriState.FALSE
-            or status.motion_possible is TriState.FALSE
-            or status.e_stopped is TriState.TRUE
-        ):
+        if vehicle is not None and says_safe(vehicle.handle.status, vehicle.handle.detail):
+            status = vehicle.handle.status
             raise UnsafeError(f"{self.now.mono - self._armed_at:.2f} s after an armed heartbeat: {status}")
 
     # the air
 
     def _pass(self, mono: float) -> None:
-        self.now = Instant(mono, START.unix_us + round((mono - START.mono) * 1e6))
+        self.now = self.gateway.now = later(START, mono - START.mono)
 
     def _send(self, sender: Sender, message: Any, fate: str, armed: bool | None) -> None:
+        if self.now.mono < sender.starts_at:
+            return
         self._order += 1
         if sender.forked:
-            data = _packed(message, self._count(sender, sender.ways[0]))
+            data = packed(message, self._count(sender, sender.ways[0]))
             frames = [(way, data) for way in sender.ways]
         else:
-            frames = [(way, _packed(message, self._count(sender, way))) for way in sender.ways]
+            frames = [(way, packed(message, self._count(sender, way))) for way in sender.ways]
         for number, (way, data) in enumerate(frames):
             said = Said(self.now.mono, self._order, way, data, sender.who, armed)
             if fate == "late" or (fate == "twice" and number == 0):
@@ -255,19 +236,26 @@ class World:
                 self._arrive(said)
 
     def _count(self, sender: Sender, way: tuple[str, int]) -> int:
-        """The next sequence number. The other sender keeps away from the count of the true one."""
+        """The next sequence number. The counts of the two senders stay away from one another."""
         number = sender.counts.get(way, 128 * sender.who)
-        if sender.who == OTHER:
-            taken = tuple(self.senders[TRUE_ONE].counts.values())
+        silence = self.now.mono - sender.spoke.get(way, self.now.mono)
+        if silence > SILENCE:
+            number = number + round(RATE * silence) & 255
+        if sender.who == OTHER or silence > SILENCE:
+            taken = tuple(self.senders[1 - sender.who].counts.values())
             if any(_distance(number, count) < FAR for count in taken):
                 number = max(range(0, 256, 8), key=lambda free: min(_distance(free, count) for count in taken))
+        jumps = number != sender.counts.get(way)
+        while jumps and self.now.mono - self._used.get((sender.who, way, number), -math.inf) < COPY:
+            number = number + 1 & 255  # the same bytes again would be a copy
+            jumps = number != sender.counts.get(way)
+        self._used[sender.who, way, number] = self.now.mono
+        sender.spoke[way] = self.now.mono
         sender.counts[way] = number + 1 & 255
         return number
 
     def _arrive(self, said: Said) -> None:
-        self._air.waiting.append(Received(said.data, said.way))
-        self._source.receive(self.now, 64)
-        self.hardware.read(self.now)
+        self.gateway.arrive(said.data, said.way)
         if said.armed is not None and said.order > self._newest:
             self._newest = said.order
             self._armed_at = self.now.mono if said.armed else -math.inf
@@ -276,11 +264,6 @@ class World:
 def _distance(one: int, other: int) -> int:
     """Between two numbers of eight bits, the shorter way round."""
     return min((one - other) & 255, (other - one) & 255)
-
-
-@lru_cache(maxsize=8192)
-def _packed(message: Any, sequence: int) -> bytes:
-    return encode(message, system=1, component=1, sequence=sequence)
 
 
 @lru_cache(maxsize=256)
@@ -326,12 +309,12 @@ def quietly() -> Iterator[None]:
         logging.disable(logging.NOTSET)
 
 
-def run(count: int, seed: int) -> str | None:
+def run(count: int, seed: int, world_type: type[World] = World) -> str | None:
     """Take `count` random steps, WORLD_STEPS in each world. Returns the steps to an unsafe status, or None."""
     with quietly():
         for first in range(0, count, WORLD_STEPS):
             random = Random(f"{seed}/{first}")
-            world = World()
+            world = world_type()
             for _ in range(min(WORLD_STEPS, count - first)):
                 name, arguments = random_step(world, random)
                 world.history.append(f"world.{name}{arguments if len(arguments) != 1 else f'({arguments[0]!r})'}")
@@ -340,5 +323,6 @@ def run(count: int, seed: int) -> str | None:
                     world.check()
                 except UnsafeError as unsafe:
                     steps = "\n".join(world.history)
-                    return f"seed {seed}, world {first}, step {len(world.history)}: {unsafe}\nworld = World()\n{steps}"
+                    begin = f"world = {world_type.__name__}()"
+                    return f"seed {seed}, world {first}, step {len(world.history)}: {unsafe}\n{begin}\n{steps}"
     return None

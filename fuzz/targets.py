@@ -20,7 +20,7 @@ from mav_robot_status.hardware.mavlink.state import text_assembly
 from mav_robot_status.hardware.mavlink.state.event_sequence import ASKABLE, KEPT
 from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.definitions import MESSAGES, CurrentEventSequence, Event, Heartbeat, Statustext
-from mav_robot_status.mavlink.encode import enclose
+from mav_robot_status.mavlink.encode import enclose, encode
 from mav_robot_status.mavlink.framing import CHECK, FIRST_CREDIT, Frame, Parser
 from mav_robot_status.mavlink.ftp.metadata import MOST_TABLE
 from mav_robot_status.mavlink.ftp.payload import ACK, NAK, OPCODES, PAYLOAD, Payload, unpack
@@ -87,7 +87,7 @@ def messages(data: bytes) -> int:
         now = Instant(mono, int(mono * 1e6))
         (frame,) = parser.feed(enclose(message_id, chunk[3:], system=system, component=1, sequence=count & 255))
         hw.take(frame, now)
-        if hw.dirty_vehicles or mono >= hw.next_due():
+        if mono >= hw.next_due():
             hw.read(now)
             hw.due_requests(now)
     for tracked in hw.vehicles:
@@ -150,13 +150,15 @@ def event_table(data: bytes) -> int:
 def events(data: bytes) -> int:
     """Any events of a PX4 in any order: nothing grows, and none of them takes the motion of an armed vehicle."""
     hw = MavlinkRobotHW(HardwareOptions())
+    parser = Parser(WANTED_IDS)
     count = 0
     for chunk in _chunks(bytes(80) + data):
         count += 1
         now = Instant(100 + count / 4, count * 250_000)
         beat = Heartbeat(4 << 16, 2, 12, 209, 4, 3)
-        hw.take(Frame(0, (1, 1), count & 255, beat, b""), now)
-        hw.take(Frame(*_event(chunk, count), b""), now)
+        for number, message in enumerate((beat, _event(chunk, count))):
+            (frame,) = parser.feed(encode(message, system=1, component=1, sequence=2 * count + number & 255))
+            hw.take(frame, now)
         hw.read(now)
         hw.due_requests(now)
     (tracked,) = hw.vehicles
@@ -167,13 +169,13 @@ def events(data: bytes) -> int:
     return count
 
 
-def _event(chunk: bytes, count: int) -> tuple[int, tuple[int, int], int, Event | CurrentEventSequence]:
+def _event(chunk: bytes, count: int) -> Event | CurrentEventSequence:
     """An event of a report, or a count, with a sequence number that is mostly near the last one."""
     sequence = (count + chunk[0] % 8 - 4 if chunk[0] < 250 else chunk[1] << 8 | chunk[0]) & 0xFFFF
     if chunk[1] % 8 == 0:
-        return 411, (1, 1), 0, CurrentEventSequence(sequence, chunk[2] // 250)
+        return CurrentEventSequence(sequence, chunk[2] // 250)
     number = (ARMING_SUMMARY, HEALTH_SUMMARY, HEALTH_SUMMARY, *CAUSE_AT)[chunk[1] % 6]
-    return 410, (1, 1), 0, Event(number, count * 250, sequence, 0, 0, chunk[2], chunk[3:].ljust(40, b"\0")[:40])
+    return Event(number, count * 250, sequence, 0, 0, chunk[2], chunk[3:].ljust(40, b"\0")[:40])
 
 
 def configuration(data: bytes) -> int:

@@ -15,7 +15,8 @@ from enum import EnumMeta
 from typing import Annotated, Any, Final, Literal, cast, get_args, get_origin, get_type_hints
 
 from ..errors import ConfigError, UsageError
-from ..hardware.group import Logic, Rule
+from ..hardware.group import Rule
+from ..hardware.join import Logic
 from ..hardware.mavlink.autopilots.mode_names import numbers
 from ..hardware.mavlink.options import CustomMode, ModeOverrides, OneOf, Or, Within
 from ..interface import RobotMode

@@ -16,6 +16,7 @@ from ..gateway.controller_config import DEFAULT_CONTROLLER
 from ..gateway.event_loop import EventLoop
 from ..gateway.recorded_log import Recording
 from ..gateway.replay import ReplayPipeline, run_through
+from ..hardware.mavlink.senders import Sender, senders
 from ..interface import LinkState
 from ..interface.explanation import explanation
 from ..language import remedy
@@ -123,14 +124,23 @@ def moment(at: str, start_us: int) -> int:
 
 
 def explanations(hw: HardwareInterface, vehicles: MavlinkRobotHW, now: Instant) -> list[JsonObject]:
-    """One explanation for each robot heard. An ArduPilot's has a member `applet`, a PX4's `arming_checks`."""
+    """One explanation for each robot heard. An ArduPilot's has a member `applet`, a PX4's `arming_checks`.
+
+    `senders` are those that speak as the vehicle, if there are several or if it is late.
+    """
     heard = list(filter(_is_heard, hw.handles))
     for handle in heard:
         hw.explain(handle.name, now)
     reports = applet.reports(vehicles, now)
     more: dict[str, JsonObject] = {name: {"applet": report} for name, report in reports.items()}
     more |= {name: {"arming_checks": checks} for name, checks in arming_checks.reports(vehicles).items()}
-    return [explanation(handle, now) | more.get(handle.name, {}) for handle in heard]
+    speak = {tracked.handle.name: senders(tracked.belief, now.mono) for tracked in vehicles.vehicles}
+    return [
+        explanation(handle, now)
+        | ({"senders": [one._asdict() for one in found]} if (found := speak.get(handle.name)) else {})
+        | more.get(handle.name, {})
+        for handle in heard
+    ]
 
 
 def _is_heard(handle: IndustrialRobotStatusHandle) -> bool:
@@ -158,6 +168,8 @@ def _table(one: JsonObject) -> Iterator[str]:
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
     for row in rows:
         yield "  ".join((row[0].ljust(widths[0]), row[1].ljust(widths[1]), row[2].rjust(widths[2]), row[3]))
+    for sender in one.get("senders", ()):
+        yield f"sender   {Sender(**sender).words}"
     if "applet" in one:
         yield f"applet   {_report(one['applet'])}"
     yield from _causes(one)

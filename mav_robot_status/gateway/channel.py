@@ -74,6 +74,26 @@ class Channel:
         """Whether sending there is forbidden."""
         return self.endpoint.passive
 
+    @property
+    def trusted(self) -> bool:
+        """Whether all bytes come from one sender: a serial device, or a TCP connection that we opened."""
+        return self.endpoint.is_serial or (self.endpoint.link.stream and not self.endpoint.listens)
+
+    @property
+    def heartbeat_timeout(self) -> float | None:
+        """Seconds without a frame after which a vehicle there is lost, if the site says so."""
+        return self.endpoint.heartbeat_timeout
+
+    @property
+    def address(self) -> str | None:
+        """The address of the peer; None if the link has one peer."""
+        return f"{self.source[0]}:{self.source[1]}" if isinstance(self.source, tuple) else None
+
+    @property
+    def named(self) -> str | None:
+        """The URL of its link with the address of this peer as the only one; None if the link has one peer."""
+        return f"{self.endpoint.url.split('?')[0]}?from={self.source[0]}" if isinstance(self.source, tuple) else None
+
     def hear_files(self, on: bool) -> None:
         """Start or stop using messages that bring files. May be repeated: the channel may have another parser now."""
         self.wanted = IDS_WITH_FILES if on else WANTED_IDS

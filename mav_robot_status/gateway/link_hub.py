@@ -9,9 +9,9 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..config import Config
+from ..hardware.mavlink.belief import Belief
 from ..hardware.mavlink.identity import is_autopilot
 from ..hardware.mavlink.message_table import COMMAND_IDS
-from ..hardware.mavlink.state.claims import Claims
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
 from ..mavlink.framing import Frame
@@ -55,7 +55,7 @@ class LinkHub:
         self.sender = Sender(clock)
         self.offered: frozenset[int]
         """The messages that a consumer can request from us."""
-        self.claims: dict[tuple[int, int], Claims[Channel]] = {}
+        self.beliefs: dict[tuple[int, int], Belief] = {}
         """Who speaks with the ids of each vehicle. The hardware interface fills it."""
         self.needs_turn = False
         """True if something was received that needs a turn at once. The hardware interface resets it."""
@@ -134,8 +134,8 @@ class LinkHub:
         self._close_links(endpoints)
         self._channels = self._audiences = None
         self._requests = {(channel, ids) for channel, ids in self._requests if channel.endpoint in self.endpoints}
-        for claims in self.claims.values():
-            claims.keep(lambda channel: channel.endpoint in self.endpoints)
+        for belief in self.beliefs.values():
+            belief.keep(lambda channel: channel.endpoint in self.endpoints)
 
     def _close_links(self, endpoints: list[Endpoint]) -> None:
         with ExitStack() as steps:  # close all, even if one raises
@@ -163,8 +163,10 @@ class LinkHub:
         found: list[Any] = channel.parser.walk(data)
         if not found:
             return ()
-        frames = [new(Frame, values) for values in found]
-        return [(frame, channel) for frame in frames if self._accepts(frame, channel, now)]
+        heard: Heard = []
+        for values in found:
+            self._accept(new(Frame, values), channel, now, heard)
+        return heard
 
     def receive(
         self,
@@ -239,10 +241,7 @@ class LinkHub:
                     channels = self._collect_channels()
                 for target in router.destinations(values, channel, channels, mono):
                     target.send(values[4])
-            if message_id in channel.wanted:
-                frame = new(Frame, values)
-                if self._accepts(frame, channel, now):
-                    heard.append((frame, channel))
+            self._accept(new(Frame, values), channel, now, heard)
 
     def _hear(self, data: bytes, frames: list[Frame], channel: Channel, now: Instant, heard: Heard) -> None:
         """Record and forward the frames of one piece, and add to `heard` those that a status needs."""
@@ -253,10 +252,8 @@ class LinkHub:
             frames = self._believed(frames, channel, now)
         if self._keep_all:
             self._forward(data, frames, channel, now)
-            frames = [frame for frame in frames if frame.message_id in channel.wanted]
         for frame in frames:
-            if self._accepts(frame, channel, now):
-                heard.append((frame, channel))
+            self._accept(frame, channel, now, heard)
 
     def receive_late(
         self, endpoint: Endpoint, now: Instant, limit: int
@@ -293,11 +290,11 @@ class LinkHub:
                 self.sender.send_heartbeat(channel, frame.ids[0])
         return believed
 
-    def _accepts(self, frame: Frame, channel: Channel, now: Instant) -> bool:
-        """Whether the hardware interface gets this frame. Handles commands to us."""
+    def _accept(self, frame: Frame, channel: Channel, now: Instant, heard: Heard) -> None:
+        """Add a frame to what the hardware interface gets. Handles commands to us."""
         policy = self.sender.signing_policy
         if policy is not None and not policy.may_speak(frame):
-            return False
+            return
         verdict = None if policy is None else proof(frame)
         endpoint = channel.endpoint
         if frame.message_id == HEARTBEAT:
@@ -306,39 +303,37 @@ class LinkHub:
                 self._note_heartbeat(channel, now.mono)
             elif is_autopilot(frame.message, frame.ids[1]):
                 channel.hear(now.mono)
-        elif frame.message_id in COMMAND_IDS:
+        elif frame.message_id in COMMAND_IDS and frame.message is not None:
             if channel.is_peer and verdict in (None, Verdict.VERIFIED):
                 self._handle_command(frame, channel)
-            return self._is_delivered(frame, channel)
-        if endpoint.is_out:
-            return False
-        if verdict is not None and (claims := self.claims.get(frame.ids)) is not None:
-            if verdict is not Verdict.VERIFIED:
-                return not claims.is_signed(now.mono)
-            claims.verified(channel, now.mono)  # its time stamp proves that it is newer than all before, on every way
-        return True
+            if self._is_delivered(frame, channel):
+                heard.append((frame, channel))
+                return
+            frame = frame._replace(message=None)  # its number still counts
+        if not endpoint.is_out:
+            heard.append((frame, channel))
 
     def _is_delivered(self, frame: Frame, channel: Channel) -> bool:
-        """Whether a command reaches the vehicle: it arrived on the vehicle's own way, or is forwarded there."""
+        """Whether a command reaches the vehicle: it arrived where the vehicle is heard, or is forwarded there."""
         system = frame.message.target_system
-        ways = {way for ids in self.vehicles() if ids[0] == system and (way := self.way_of(ids)) is not None}
-        if channel in ways:
+        beliefs = [belief for ids, belief in self.beliefs.items() if ids[0] == system and belief.channel is not None]
+        if any(belief.hears(channel) for belief in beliefs):
             return True
         if self._router is None or not channel.is_peer:
             return False
-        return not ways.isdisjoint(self._router.decided(frame, channel))
+        return not {belief.channel for belief in beliefs}.isdisjoint(self._router.decided(frame, channel))
 
-    def way_of(self, ids: tuple[int, int]) -> Channel | None:
-        """The channel that counts for a vehicle; None if it was not heard."""
-        claims = self.claims.get(ids)
-        return None if claims is None else claims.way
+    def channel_of(self, ids: tuple[int, int]) -> Channel | None:
+        """The channel on which a vehicle is best reached; None if it was not heard."""
+        belief = self.beliefs.get(ids)
+        return None if belief is None else belief.channel
 
     def vehicles(self) -> frozenset[tuple[int, int]]:
         """The ids of the vehicles that are heard on a link."""
-        return frozenset(ids for ids, claims in self.claims.items() if claims.way is not None)
+        return frozenset(ids for ids, belief in self.beliefs.items() if belief.channel is not None)
 
     def heard_vehicle(self, ids: tuple[int, int], channel: Channel, now: float) -> None:
-        """Note a heartbeat of a vehicle on this channel, which is its selected way."""
+        """Note a heartbeat of a vehicle on this channel."""
         self._note_heartbeat(channel, now)
         channel.systems.add(ids[0])
 
@@ -391,7 +386,7 @@ class LinkHub:
         """The vehicles on passive links. Nothing may be sent to them."""
         if not self.has_passive:
             return NONE
-        return frozenset(ids for ids, claims in self.claims.items() if claims.way is None or claims.way.passive)
+        return frozenset(ids for ids, b in self.beliefs.items() if b.channel is None or b.channel.passive)
 
     def audiences(self) -> Sequence[Audience]:
         """The receivers of statuses: peers and outs. Not serial vehicle links: autopilots drop unknown ids."""
@@ -432,7 +427,7 @@ class LinkHub:
                 channel.quiet = False
         self._channels = self._audiences = None
         for tracked in vehicles:
-            path = self.way_of(tracked.ids) if tracked.ids is not None and speaks_for(tracked) else None
+            path = self.channel_of(tracked.ids) if tracked.ids is not None and speaks_for(tracked) else None
             if path is not None and tracked.ids is not None:
                 if tracked.costly:
                     path.quiet = True
@@ -442,19 +437,28 @@ class LinkHub:
 
     def ask(self, request: Ask) -> None:
         """Send a request to a vehicle."""
-        path = self.way_of((request.system, request.component))
+        path = self.channel_of((request.system, request.component))
         if path is not None:
             path.endpoint.speech.count(self.sender.send(path, request.message, request.system))
 
     def vehicles_on(self, endpoint: Endpoint) -> list[tuple[int, int]]:
         """The ids of the vehicles that are heard on a link."""
-        return [
-            ids for ids, claims in self.claims.items() if claims.way is not None and claims.way.endpoint is endpoint
-        ]
+        found = ((ids, belief.channel) for ids, belief in self.beliefs.items())
+        return [ids for ids, channel in found if channel is not None and channel.endpoint is endpoint]
+
+    def reconnected(self, endpoint: Endpoint) -> None:
+        """Note that a link has a new connection."""
+        for belief in self.beliefs.values():
+            belief.reconnected(lambda channel: channel.endpoint is endpoint)
+
+    def lag(self, frame: Frame) -> float:
+        """How late a frame is by its signature, seconds."""
+        policy = self.sender.signing_policy
+        return 0.0 if policy is None else policy.lag(frame)
 
     def may_ask(self, ids: tuple[int, int], number: int) -> bool:
         """Whether the link of a vehicle has room for this number of requests and one more, in this second."""
-        path = self.way_of(ids)
+        path = self.channel_of(ids)
         return path is not None and path.endpoint.speech.has_room_for(number * REQUEST_SIZE)
 
     # logging and closing
@@ -469,8 +473,8 @@ class LinkHub:
         with ExitStack() as steps:  # close all, even if one raises
             steps.callback(self._close_links, self.endpoints)
             steps.callback(self.sender.close)
-        if unused := sum(claims.unused for claims in self.claims.values()):
-            log.info("%d duplicate frames on other paths", unused)
+        if copied := sum(belief.copied for belief in self.beliefs.values()):
+            log.info("%d duplicate frames", copied)
 
     def log_silence(self) -> None:
         """Log that no autopilot is heard, with a line for each vehicle link."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ..config import Config
 from ..hardware.mavlink.interface import MavlinkRobotHW
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..clock import Instant
+    from ..hardware.mavlink.belief import Belief
     from ..hardware.mavlink.px4_events import EventTable
-    from ..hardware.mavlink.state.claims import Claims
     from ..interface import IndustrialRobotStatusInterface, IoSource
     from ..mavlink.framing import Frame
     from .channel import Channel
@@ -42,7 +42,7 @@ FIRST_SILENCE, LATER_SILENCE = 3.5, 30.0  # s without an autopilot until the fir
 
 def robot_hw(
     config: Config,
-    claims: dict[tuple[int, int], Claims[Any]] | None = None,
+    beliefs: dict[tuple[int, int], Belief] | None = None,
     table: EventTable | None = None,
 ) -> MavlinkRobotHW:
     """The vehicles of a configuration, in the state before the first heartbeat.
@@ -50,19 +50,10 @@ def robot_hw(
     `table` is that of the configuration, if it was read already. Raises UsageError if it cannot be read.
     """
     slots = [ExpectedVehicle(v.system, v.component, v.handle, v.name) for v in config.vehicles]
-    vehicles = MavlinkRobotHW(config.hardware, slots, config.identity.component, claims, config.names)
+    vehicles = MavlinkRobotHW(config.hardware, slots, config.identity.component, beliefs, config.names)
     vehicles.speak_as(config.identity.system, config.identity.component)
-    vehicles.link_timeout = _link_timeout(config)
     vehicles.use_event_table(None, table or event_table(config))
     return vehicles
-
-
-def _link_timeout(config: Config) -> Callable[[Any], float | None] | None:
-    """The heartbeat timeout of the link of a way; None if no link has one. A log has one way, which is None."""
-    if all(link.heartbeat_timeout is None for link in config.links):
-        return None
-    of_log = config.links[0].heartbeat_timeout
-    return lambda way: of_log if way is None else way.endpoint.heartbeat_timeout
 
 
 def wants_tables(config: Config) -> bool:
@@ -79,7 +70,7 @@ class MavlinkHardware:
         """Open the links; with `opens` False only `open` does it. Raises LinkError, UsageError."""
         self._event_table = event_table(config)
         self.hub = LinkHub(config if opens else Config(), clock, observers)
-        self.vehicles = robot_hw(config, self.hub.claims, self._event_table)
+        self.vehicles = robot_hw(config, self.hub.beliefs, self._event_table)
         self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
         self.tables = EventTables(self.hub, self._use_table, parse, cache=EventTableCache(default_folder()))
         self.changed = False
@@ -136,7 +127,7 @@ class MavlinkHardware:
 
     def renew(self) -> None:
         """Use the vehicles and options of the new configuration. Vehicles in both configurations keep their state."""
-        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.claims, self._event_table)
+        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.beliefs, self._event_table)
         self.vehicles.adopt(before)
         self.vehicles.asks = before.asks
         self._want_tables(self._config)
@@ -165,7 +156,7 @@ class MavlinkHardware:
                 continue
             if vehicles.deadline < at.mono:
                 vehicles.read(at)
-            vehicle = vehicles.take(frame, at, channel)
+            vehicle = vehicles.take(frame, at, channel, self.hub.lag(frame))
             if vehicle is not None and vehicle.ids is not None:
                 self.hub.heard_vehicle(vehicle.ids, channel, at.mono)
             if self.observers:
@@ -176,7 +167,7 @@ class MavlinkHardware:
         for observer in self.observers:
             for frame, channel in heard:
                 vehicle = self.vehicles.find(*frame.ids)
-                if vehicle is not None and vehicle.claims.way is channel:
+                if vehicle is not None and vehicle.belief.channel is channel:
                     observer.on_frame(frame, now)
 
     # a turn
@@ -285,9 +276,10 @@ class LinkSource:
         if self._endpoint.connections != self._connections:
             self._connections = self._endpoint.connections
             hardware.vehicles.reconnected(self._hub.vehicles_on(self._endpoint), now.mono)
-        take = hardware.vehicles.take
+            self._hub.reconnected(self._endpoint)
+        take, lag = hardware.vehicles.take, self._hub.lag
         for frame, channel in heard:
-            vehicle = take(frame, now, channel)
+            vehicle = take(frame, now, channel, lag(frame))
             if vehicle is not None and vehicle.ids is not None:
                 self._hub.heard_vehicle(vehicle.ids, channel, now.mono)
         if hardware.observers:

@@ -44,6 +44,15 @@ class NoMavlinkPort:
         """Send nothing."""
 
 
+class RecordedLink(NamedTuple):
+    """Where the frames of a log were heard. It has the timeout of the first link of the configuration."""
+
+    heartbeat_timeout: float | None
+
+    def __str__(self) -> str:
+        return "the log"
+
+
 def replay(config: Config, path: str, stdout: TextIO, *, raw: bool = False) -> None:
     """Replay the log at `path`. `raw`: the log has no time stamps.
 
@@ -68,6 +77,7 @@ class ReplayPipeline(Pipeline):
         others = [open_interface(interface, replay=True, clock=lambda: self.now) for interface in config.interfaces]
         hw = combined(config, self.vehicles, others)
         self.max_gap = config.max_gap
+        self.source = next((RecordedLink(link.heartbeat_timeout) for link in config.links), RecordedLink(None))
         super().__init__(config, hw, NoMavlinkPort(), stdout, patient=True, observers=observers)
 
     def hears_nothing(self) -> bool:
@@ -85,32 +95,27 @@ class ReplayPipeline(Pipeline):
 def run_through(pipeline: ReplayPipeline, recording: Iterable[Stamped]) -> Instant:
     """Feed a recording to the pipeline. Returns the last instant; everything due before it is done."""
     hw = pipeline.vehicles
-    records = iter(recording)
     last = NEVER
     due = -math.inf  # time starts at the first record
-    while True:
-        last, record = hw.take_all(records, last, due)
-        if record is not None:
-            now, frame, new_segment = record
-            mono = now.mono
-            if new_segment:
-                pipeline.forget(last)
-            elif due < mono or hw.deadline < mono:
-                if last is NEVER:
-                    pipeline.tick(now)  # publish configured vehicles before their first heartbeat
-                    last = now
-                due = pipeline.next_due(last.mono, mono)
-                if due < mono:
-                    run_until(pipeline, last, now)
-                    due = pipeline.next_due(mono)
-            if frame is not None:
-                hw.take(frame, now)
-            last = now
-        elif not hw.dirty_vehicles:
-            return last
-        if hw.dirty_vehicles:
-            pipeline.tick(last)
+    for now, frame, new_segment in recording:
+        if new_segment:
+            pipeline.forget(last)
+        elif due < now.mono or hw.deadline < now.mono:
+            if last is NEVER:
+                pipeline.tick(now)  # publish configured vehicles before their first heartbeat
+                last = now
             due = pipeline.next_due(last.mono)
+            if due < now.mono:
+                run_until(pipeline, last, now)
+                due = pipeline.next_due(now.mono)
+        last = now
+        if frame is None:
+            continue
+        hw.take(frame, now, pipeline.source)
+        if hw.deadline == -math.inf:
+            pipeline.tick(now)
+            due = pipeline.next_due(now.mono)
+    return last
 
 
 def run_until(pipeline: ReplayPipeline, last: Instant, until: Instant) -> None:

@@ -1,12 +1,11 @@
 """One handle of several: the status of a robot that has several controllers, such as an arm on a vehicle.
 
-Each field of the group is Kleene logic over the field of its members. A member whose link is lost is UNKNOWN in every
-field, and so counts as UNKNOWN.
+Each field of the group is three-valued logic over the field of its members, hazard first. A member
+whose link is lost is UNKNOWN in every field, and so counts as UNKNOWN.
 """
 
 from __future__ import annotations
 
-from enum import Enum
 from typing import TYPE_CHECKING, Final
 
 from ..interface import (
@@ -21,9 +20,10 @@ from ..interface import (
     Vehicle,
 )
 from ..values import NamedTuple
+from .join import Logic, join
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from ..interface import ErrorCause, IndustrialRobotStatusHandle
 
@@ -31,15 +31,6 @@ GROUP: Final = "GROUP"
 """`vehicle.type` of a group."""
 NOT_POSSIBLE: Final = "MOTION_NOT_POSSIBLE"
 """The inhibit for a member that gives no reason of its own."""
-
-
-class Logic(Enum):
-    """How the values of the members become that of the group. For `mode`, MANUAL is TRUE and AUTO is FALSE."""
-
-    ANY = "any"
-    """TRUE if one is TRUE, FALSE if all are FALSE."""
-    ALL = "all"
-    """TRUE if all are TRUE, FALSE if one is FALSE."""
 
 
 class Rule(NamedTuple):
@@ -52,9 +43,9 @@ class Rule(NamedTuple):
 
 RULES: Final[dict[str, Rule]] = {
     "mode": Rule(Logic.ANY),  # a person commands a part of it
-    "e_stopped": Rule(Logic.ANY),  # something is stopped and must be released
+    "e_stopped": Rule(Logic.AGREE),  # a part that is not stopped is a hazard
     "drives_powered": Rule(Logic.ANY),  # a hazard while any part is powered
-    "motion_possible": Rule(Logic.ALL),  # the robot as a whole can do its work
+    "motion_possible": Rule(Logic.ANY),  # a hazard while any part can move
     "in_motion": Rule(Logic.ANY),
     "in_error": Rule(Logic.ANY),
 }
@@ -109,15 +100,6 @@ class Combined(NamedTuple):
     evidence: dict[str, Evidence]
 
 
-def kleene(logic: Logic, values: Iterable[TriState]) -> TriState:
-    """Kleene's strong three-valued logic: OR for ANY, AND for ALL. UNKNOWN without values."""
-    decisive, other = (TriState.TRUE, TriState.FALSE) if logic is Logic.ANY else (TriState.FALSE, TriState.TRUE)
-    found = set(values)
-    if decisive in found:
-        return decisive
-    return other if found == {other} else TriState.UNKNOWN
-
-
 def combine(group: Group, members: Sequence[Member], before: Detail, unix_us: int) -> Combined:
     """The status of a group of these members at `unix_us`; `before` is the previous detail."""
     values, evidence = {}, {}
@@ -158,7 +140,7 @@ def _field(group: Group, field: str, members: Sequence[Member]) -> tuple[TriStat
     """One field, with the member that decided."""
     logic, of = group.rule(field)
     asked = [member for member in members if of is None or member.name == of]
-    value = kleene(logic, [_value(member, field) for member in asked])
+    value = join(logic, [_value(member, field) for member in asked])
     deciding = [member for member in asked if _value(member, field) is value]
     if not deciding:
         return value, Evidence("no member of the group knows")

@@ -81,6 +81,11 @@ INHIBIT_ROWS: Final[dict[str, Remedy]] = {
     "SENDER_UNCERTAIN": Remedy(
         "somebody else may speak with its ids", "Give every autopilot a system id of its own.", "senders"
     ),
+    "HEARTBEAT_LATE": Remedy(
+        "frames arrive, but the heartbeat is late",
+        "Look for a radio or a program that stores frames. The command doctor says how late they are.",
+        "link",
+    ),
     "MOTION_NOT_POSSIBLE": Remedy("the robot does not say why", "Look at its own display.", "robot-arm"),
 }
 """The inhibits of a vehicle and of a group."""

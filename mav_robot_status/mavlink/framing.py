@@ -1,7 +1,7 @@
 """Bytes in, frames out: a parser for MAVLink 1 and 2 without I/O.
 
 `Parser` goes from frame to frame by the length in each header, and checks the CRC of every frame whose id is in
-`definitions.CRC_EXTRA`. Only wanted frames become values. The parser has two states. *In sync* it trusts a header far
+`definitions.CRC_EXTRA`. Only wanted messages are decoded. The parser has two states. *In sync* it trusts a header far
 enough to skip a frame that it cannot check. *Out of sync* it accepts only a whole frame with a valid CRC. So a wrong
 length byte cannot hide the valid frames behind it, and no damaged frame is counted twice.
 
@@ -53,18 +53,16 @@ class Frame(NamedTuple):
     """System id and component id of the sender."""
     sequence: int
     message: Any
-    """A message of `definitions`; None if the id is not one of them."""
+    """A message of `definitions`; None if it is not wanted, or its id is not one of them."""
     raw: bytes
-    """The whole frame as received if it is signed (not verified) or the parser keeps all frames; else b""."""
+    """The whole frame as received. A signature is not verified. An id outside CRC_EXTRA: the CRC is not checked."""
     stamp: int = 0
     """Microseconds since 1970 if frames have stamps (a recorded log); else 0."""
 
     @property
     def payload(self) -> bytes:
-        """The payload as received; empty if `raw` is. MAVLink 2 removes trailing zeros."""
+        """The payload as received. MAVLink 2 removes trailing zeros."""
         raw = self.raw
-        if not raw:
-            return raw
         header = FORMATS[raw[0]].header
         return raw[header : header + raw[1]]
 
@@ -76,8 +74,8 @@ Values = tuple[int, tuple[int, int], int, Any, bytes, int]
 class Parser:
     """Finds the frames in the bytes of one link or log. A feed may end anywhere within a frame.
 
-    `wanted` are the message ids that `feed` returns; frames of other ids are only checked and counted. None: `feed`
-    returns every frame with its `raw` bytes, also those of unknown ids, which it cannot check (for forwarding).
+    It returns every frame with its number and bytes, also those of unknown ids, which it cannot check. `wanted` are the
+    ids of the messages that are decoded; None: all that are known.
     `stamped`: a time stamp precedes each frame, as in a recorded log.
     """
 
@@ -87,7 +85,6 @@ class Parser:
         "_expected",
         "_format",
         "_in_sync",
-        "_keep_all",
         "_known",
         "_next_expected",
         "_open",
@@ -112,13 +109,11 @@ class Parser:
         self._current = 0  # the last source: system | component << 8; 0.0 means none
         self._next_expected: int | None = None  # the next sequence number of the last source
         self._expected: dict[int, int | None] = {}  # by source; the entry of the last source may be out of date
-        self._keep_all = wanted is None
         self._known = known_ids(frozenset(CRC_EXTRA if wanted is None else wanted))
 
     def want(self, ids: frozenset[int]) -> None:
-        """Return the frames of these ids from now on. A parser that keeps all frames does so anyway."""
-        if not self._keep_all:
-            self._known = known_ids(ids)
+        """Decode the messages of these ids from now on."""
+        self._known = known_ids(ids)
 
     @property
     def pending(self) -> int:
@@ -133,15 +128,14 @@ class Parser:
         self._open, self._searched = [], 0
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The wanted frames that these bytes complete, in order. Never raises; keeps at most MAX_FRAME bytes."""
+        """The frames that these bytes complete, in order. Never raises; keeps at most MAX_FRAME bytes."""
         found: list[Any] = self.walk(data)
         return [new(Frame, values) for values in found] if found else found
 
     def walk(self, data: bytes) -> list[Values]:
         """The frames of `feed` as plain tuples.
 
-        One loop with local names. It makes no call and no object for an unwanted frame: the speed of the gateway
-        depends on these few hundred nanoseconds a frame.
+        One loop with local names: the speed of the gateway depends on these few hundred nanoseconds a frame.
         """
         if self._tail:
             data = self._tail + data
@@ -185,9 +179,9 @@ class Parser:
                 if following > limit:
                     break
                 try:
-                    effect, reads = known[wire_id]
+                    effect, message_id, reader = known[wire_id]
                 except KeyError:
-                    effect, reads = UNKNOWN
+                    effect, message_id, reader = UNKNOWN
                 if crc_hqx(reversed_data[i:end], seed) ^ effect != UNDO[reversed_data[end + 1]] ^ reversed_data[end]:
                     if current in expected:
                         expected[current] = next_expected
@@ -195,8 +189,9 @@ class Parser:
                     i = self._skip_unverified(data, reversed_data, i, following, sequence, source, wire_id)
                     next_expected = expected.get(current)
                     if self._in_sync and i > unverified:
-                        if self._keep_all and effect < 0 and i == following:
-                            frames.append(_unchecked(data, unverified, following - stamped))
+                        if effect < 0 and i == following:
+                            stamp = STAMP(data, unverified - stamped)[0] if stamped else 0
+                            frames.append(_unchecked(data, unverified, following - stamped, stamp))
                         continue
                     break
                 before = i
@@ -215,19 +210,16 @@ class Parser:
                         continue
                     self.counters.signed += 1
                 good += 1
-                if reads is not None:
-                    message_id, reader = reads
-                    if reader is None:
-                        message = None
+                if reader is None:
+                    message = None
+                else:
+                    kind, whole, fields = reader
+                    if length >= whole:
+                        message = new(kind, fields(data, end - length))
                     else:
-                        kind, whole, fields = reader
-                        if length >= whole:
-                            message = new(kind, fields(data, end - length))
-                        else:
-                            message = new(kind, fields(data[end - length : end].ljust(whole, b"\0")))
-                    raw = data[before : i - stamped] if flags or self._keep_all else b""
-                    stamp = STAMP(data, before - stamped)[0] if stamped else 0
-                    frames.append((message_id, ids, sequence, message, raw, stamp))
+                        message = new(kind, fields(data[end - length : end].ljust(whole, b"\0")))
+                stamp = STAMP(data, before - stamped)[0] if stamped else 0
+                frames.append((message_id, ids, sequence, message, data[before : i - stamped], stamp))
         except struct.error:
             pass  # the data ends within a header
         self._current, self._next_expected = current, next_expected
@@ -351,7 +343,7 @@ class Parser:
             return i + header
         length, flags, _, _, wire_id = unpack(data, i)
         known = self._known[version]
-        effect, _ = known[wire_id] if version == V1 or wire_id in known else UNKNOWN
+        effect, _, _ = known[wire_id] if version == V1 or wire_id in known else UNKNOWN
         if effect < 0:
             return WRONG
         end = i + header + length
@@ -362,9 +354,9 @@ class Parser:
         return VALID if crc == UNDO[reversed_data[end + 1]] ^ reversed_data[end] else WRONG
 
 
-def _unchecked(data: bytes, i: int, following: int) -> Frame:
+def _unchecked(data: bytes, i: int, following: int, stamp: int) -> Frame:
     """A frame of an unknown id, with the values of its header."""
     raw = data[i:following]
     if raw[0] == V2:
-        return Frame(int.from_bytes(raw[7:10], "little"), (raw[5], raw[6]), raw[4], None, raw)
-    return Frame(raw[5], (raw[3], raw[4]), raw[2], None, raw)
+        return Frame(int.from_bytes(raw[7:10], "little"), (raw[5], raw[6]), raw[4], None, raw, stamp)
+    return Frame(raw[5], (raw[3], raw[4]), raw[2], None, raw, stamp)

@@ -57,9 +57,9 @@ def _format(magic: int, header: str) -> Format:
 
 FORMATS: Final = {V2: _format(V2, "<xBBxBH3s"), V1: _format(V1, "<xB0sBHB")}
 
-Known = tuple[int, "tuple[int, Reader | None] | None"]
-"""The effect of CRC_EXTRA on a CRC, and for a wanted message its id and its reader."""
-UNKNOWN: Final[Known] = -1, None
+Known = tuple[int, int, "Reader | None"]
+"""The effect of CRC_EXTRA on a CRC, the message id, and the reader of a wanted message."""
+UNKNOWN: Final[Known] = -1, -1, None
 """An id that cannot be checked: the effect is negative, so no CRC is valid."""
 
 
@@ -69,8 +69,7 @@ def known_ids(wanted: frozenset[int]) -> dict[int, Any]:
     known_v1 = [UNKNOWN] * 256
     known_v2 = {}
     for message_id, crc_extra in CRC_EXTRA.items():
-        reads = (message_id, READERS.get(message_id)) if message_id in wanted else None
-        entry = REVERSED[crc_extra] << 8, reads
+        entry = REVERSED[crc_extra] << 8, message_id, READERS.get(message_id) if message_id in wanted else None
         known_v2[message_id.to_bytes(3, "little")] = entry
         if message_id < len(known_v1):
             known_v1[message_id] = entry

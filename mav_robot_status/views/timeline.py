@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..interface import Detail, Evidence, IndustrialRobotStatusHandle, RobotStatus
 
+UNTOLD: Final = {"HEARTBEAT_LATE", "SENDER_UNCERTAIN"}
+"""Inhibits with which nobody knows whether the autopilot is armed."""
 TRACKS: Final = ("link", "flight_mode", "armed", *(field.name for field in STATES))
 """The tracks of each vehicle. A track has one value at a time."""
 NO_NAME: Final = ""
@@ -208,7 +210,8 @@ def _armed(detail: Detail) -> TriState:
     """
     if detail.link is not LinkState.CONNECTED or detail.members:
         return TriState.UNKNOWN
-    return TriState(all(inhibit.name != "DISARMED" for inhibit in detail.inhibits))
+    names = {inhibit.name for inhibit in detail.inhibits}
+    return TriState.UNKNOWN if names & UNTOLD else TriState("DISARMED" not in names)
 
 
 def _follow(is_open: dict[_Named, Reason], closed: list[Reason], active: Iterable[Reason], at: int) -> None:

@@ -74,27 +74,49 @@ class Judgement(NamedTuple):
     point: dict[str, Any]
 
 
+class Lines(NamedTuple):
+    """The lines of one vehicle, in order."""
+
+    stamps: list[float]
+    """Unix seconds."""
+    rows: list[dict[str, Any]]
+
+    def at(self, t: float) -> dict[str, Any] | None:
+        """The last line at a time; None if there is none, or it is too old to count."""
+        i = bisect.bisect_right(self.stamps, t + 5e-7) - 1
+        return None if i < 0 or t - self.stamps[i] > OLDEST else self.rows[i]
+
+
+def answer(row: dict[str, Any], field: str) -> object:
+    """What a line says of a field of the ground truth."""
+    return row["link"]["state"] if field == "link" else row[field]
+
+
+def lines_of_vehicle(log: pathlib.Path, ids: tuple[int, int], options: HardwareOptions | None = None) -> Lines:
+    """The lines of the vehicle with these ids: system, component."""
+    rows = [row for row in map(json.loads, lines_of(log, options)) if (row["system"], row["component"]) == ids]
+    return Lines([datetime.fromisoformat(row["stamp"].replace("Z", "+00:00")).timestamp() for row in rows], rows)
+
+
 def judged(truth_file: pathlib.Path, log: pathlib.Path, options: HardwareOptions | None = None) -> list[Judgement]:
     """The verdict on every checkpoint of a truth file."""
     truth = json.loads(truth_file.read_text(encoding="utf-8"))
-    stamps, rows = [], []
-    for line in lines_of(log, options):
-        row = json.loads(line)
-        if (row["system"], row["component"]) == (truth["system"], truth["component"]):
-            stamps.append(datetime.fromisoformat(row["stamp"].replace("Z", "+00:00")).timestamp())
-            rows.append(row)
+    return judgements(truth["checkpoints"], lines_of_vehicle(log, (truth["system"], truth["component"]), options))
+
+
+def judgements(points: list[dict[str, Any]], lines: Lines) -> list[Judgement]:
+    """The verdict on every checkpoint; where `in_error` is as expected, `error_code` has one as well."""
     out = []
-    for point in truth["checkpoints"]:
-        i = bisect.bisect_right(stamps, point["t"] + 5e-7) - 1
-        if i < 0 or point["t"] - stamps[i] > OLDEST:
-            out.append(Judgement("missing", point["field"], None, point))
+    for point in points:
+        field, row = point["field"], lines.at(point["t"])
+        if row is None:
+            out.append(Judgement("missing", field, None, point))
             continue
-        field = point["field"]
-        got = rows[i]["link"]["state"] if field == "link" else rows[i][field]
+        got = answer(row, field)
         verdict = _verdict(got, point["expect"], point["acceptable"])
         out.append(Judgement(verdict, field, got, point))
-        if field == "in_error" and verdict == "right":
-            out.append(_judged_code(rows[i]["error_code"], point))
+        if field == "in_error" and got == point["expect"]:
+            out.append(_judged_code(row["error_code"], point))
     return out
 
 

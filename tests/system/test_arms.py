@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import socket
 import threading
@@ -75,14 +76,16 @@ def test_an_arm_and_a_vehicle_are_one_robot(
     rover = wire(gate.address).beating()
     gate.wait_for(of("arm", drives_powered=True, motion_possible=True))
     gate.wait_for(of(VEHICLE, drives_powered=False))
-    line = gate.wait_for(of("robot", drives_powered=True, motion_possible=False))
-    assert {inhibit["handle"] for inhibit in line.status["inhibits"]} == {VEHICLE}
+    line = gate.wait_for(of("robot", drives_powered=True, motion_possible=True))  # one member is enough
+    assert line.status["inhibits"] == []
     pressed = time.monotonic()
     arm.press_emergency_stop()
-    line = gate.wait_for(of("robot", e_stopped=True), after=pressed)
+    gate.wait_for(of("arm", e_stopped=True), after=pressed)
+    line = gate.wait_for(of("robot", e_stopped=None, motion_possible=False), after=pressed)  # nobody stopped the rover
+    assert {one["handle"] for one in line.status["inhibits"]} == {VEHICLE, "arm"}
     assert "E_STOPPED" in {one["name"] for one in line.status["inhibits"] if one["handle"] == "arm"}
     armed = rover.beat(armed=True)
-    line = gate.wait_for(of("robot", e_stopped=True, drives_powered=True), after=armed)
+    line = gate.wait_for(of("robot", e_stopped=None, drives_powered=True, motion_possible=True), after=armed)
     validate(line.status)
     assert gate.stop() == 0
 
@@ -100,14 +103,14 @@ def test_a_group_stands_on_the_group_of_another_gateway(gateway: StartGateway, w
     outer = gateway("--arm", f"simple_message:{host}:{port}", "--arm", ur(arm.port))
     outer.wait_for(of("arm2", drives_powered=True))
     outer.wait_for(of("arm", drives_powered=False, motion_possible=False))
-    outer.wait_for(of("robot", drives_powered=True, motion_possible=False))
+    outer.wait_for(of("robot", drives_powered=True, motion_possible=True))
     armed = rover.beat(armed=True, custom_mode=10)
     seen = outer.wait_for(of("arm", drives_powered=True, mode="AUTO"), after=armed)
     assert in_time(seen.at - armed, 1.0)
     inner.stop()
     lost = outer.wait_for(lambda line: line["handle"] == "arm" and line["link"]["state"] == "LOST")
     assert (lost.status["mode"], lost.status["drives_powered"]) == ("UNKNOWN", None)
-    outer.wait_for(of("robot", drives_powered=True, motion_possible=None), after=lost.at)
+    outer.wait_for(of("robot", drives_powered=True, motion_possible=True, e_stopped=None), after=lost.at)
     assert outer.stop() == 0
 
 
@@ -172,11 +175,12 @@ def test_a_fault_of_the_controller_is_one_line_and_the_vehicle_is_not_late(
     line = logged.format(port=port)
     gate.wait_for_log(line)
     until = time.monotonic() + PATIENCE
-    armed = False
-    while time.monotonic() < until:
-        armed = not armed
-        sent = rover.beat(armed=armed)
-        seen = gate.wait_for(of(VEHICLE, drives_powered=armed), after=sent)
+    modes = itertools.cycle(((10, "AUTO"), (0, "MANUAL")))
+    while (left := until - time.monotonic()) > 0:
+        armed = left < PATIENCE / 2
+        custom_mode, mode = next(modes)
+        sent = rover.beat(armed=armed, custom_mode=custom_mode)
+        seen = gate.wait_for(of(VEHICLE, drives_powered=armed, mode=mode), after=sent)
         assert in_time(seen.at - sent, LINE_AFTER)
         # one member that is powered proves it; one that is not proves nothing of the arm
         gate.wait_for(of("robot", drives_powered=True if armed else None, e_stopped=None), after=sent)

@@ -144,12 +144,12 @@ def test_the_first_speaker_is_not_believed_against_an_armed_vehicle_elsewhere(
     forger = vehicle(armed=False, count=128).beating(gate.address)
     gate.wait_for(lambda s: s["drives_powered"] is False)
     vehicle(armed=True).beating(gate.address)
-    told = gate.wait_for(lambda s: s["drives_powered"] is None).at
-    found = gate.wait_for(conflict, after=told, seconds=SOON + 6)
-    assert gate.wait_for_log(r"two autopilots claim the ids 1\.1: \S+, .* and \S+")
+    told = gate.wait_for(lambda s: s["drives_powered"] is True).at
+    gate.wait_for(conflict, after=told, seconds=SOON + 6)
+    assert gate.wait_for_log(r"two autopilots use the ids 1\.1: \S+, .* and \S+")
+    assert gate.wait_for_log(r"Two senders speak as vehicle 1\.1: \S+ and \S+ \(armed and disarmed at the same time\)")
     lines_for(gate, 2)
     assert unsafe(gate, told) == []
-    assert found.status["mode"] == "UNKNOWN"
     assert forger.to == gate.address
 
 
@@ -161,7 +161,7 @@ def test_a_first_speaker_that_is_armed_and_cannot_move_is_not_believed_against_o
     vehicle(armed=True, state=state, count=128).beating(gate.address)
     gate.wait_for(lambda s: s["motion_possible"] is False)
     real = vehicle(armed=True).beating(gate.address)
-    told = gate.wait_for(lambda s: s["motion_possible"] is None).at
+    told = gate.wait_for(lambda s: s["motion_possible"] is True).at
     lines_for(gate, 2)
     real.silence()
     lines_for(gate, 1.0)
@@ -184,7 +184,7 @@ def test_a_dropout_of_the_vehicle_does_not_make_a_disarmed_sender_the_vehicle(
     assert unsafe(gate, start) == []
 
 
-def test_during_a_conflict_every_field_is_unknown_on_which_the_senders_differ(
+def test_during_a_conflict_one_sender_that_says_live_is_believed_and_none_that_says_safe(
     gateway: StartGateway, vehicle: Callable[..., Vehicle]
 ) -> None:
     gate = gateway(HERE)
@@ -194,9 +194,9 @@ def test_during_a_conflict_every_field_is_unknown_on_which_the_senders_differ(
     found = gate.wait_for(conflict)
     lines_for(gate, 2)
     told = [line.status for line in gate.lines if line.at >= found.at]
-    for name in ("drives_powered", "motion_possible", "in_motion", "e_stopped"):
-        assert {status[name] for status in told} == {None}
-    assert {status["mode"] for status in told} == {"UNKNOWN"}
+    for name, value in (("drives_powered", True), ("motion_possible", True), ("in_motion", None), ("e_stopped", None)):
+        assert {status[name] for status in told} == {value}
+    assert {status["vehicle"]["flight_mode"] for status in told} == {None}
     assert all(conflict(status) for status in told)
 
 

@@ -210,9 +210,10 @@ def test_one_that_fails_or_blocks_leaves_mavlink_alone(
     gate.wait_for_log(logged)
     if mode == "crash":
         gate.wait_for(lambda s: s["handle"] == "arm" and s["link"]["state"] == "LOST", after=sent)
-    for armed in (True, False, True, False):
-        beat = rover.beat(armed=armed)
-        gate.wait_for(of("industrial_robot_status_handle", drives_powered=armed), after=beat, seconds=2.0)
+    for custom_mode, mode in ((10, "AUTO"), (0, "MANUAL"), (10, "AUTO"), (0, "MANUAL")):
+        beat = rover.beat(armed=True, custom_mode=custom_mode)
+        seen = of("industrial_robot_status_handle", drives_powered=True, mode=mode)
+        gate.wait_for(seen, after=beat, seconds=2.0)
     assert sum(logged in line for line in gate.log) == 1
     assert gate.stop() == 0
 

@@ -44,7 +44,8 @@ def test_a_recording_replays_as_it_was_live(gateway: StartGateway, autopilot: St
     assert replayed.returncode == 0
     powered = [line.split('"drives_powered": ')[1][:4] for line in replayed.stdout.splitlines()]
     different = [value for n, value in enumerate(powered) if n == 0 or value != powered[n - 1]]
-    assert different[-3:] == ["fals", "true", "fals"]
+    known = [value for value in different if value != "null"]  # between the accepted command and the HEARTBEAT
+    assert known[-3:] == ["fals", "true", "fals"]
 
 
 def test_a_recording_survives_the_kill_of_its_process(

@@ -36,8 +36,9 @@ def test_arming_and_modes_are_in_a_line_within_50_ms_of_their_heartbeat(
     assert first.status["mode"] == "MANUAL"
     assert first.status["seq"] == 0
     late = []
-    for custom_mode, mode in ((10, "AUTO"), (0, "MANUAL"), (10, "AUTO"), (0, "MANUAL"), (15, "AUTO")):
-        armed = not rover.armed
+    for armed, custom_mode, mode in (
+        (False, 10, "AUTO"), (False, 0, "MANUAL"), (True, 10, "AUTO"), (True, 0, "MANUAL"), (True, 15, "AUTO"),
+    ):  # fmt: skip
         sent = rover.beat(armed=armed, custom_mode=custom_mode)
         line = gate.wait_for(partial(says, armed, mode), after=sent)
         late.append(line.at - sent)

@@ -122,13 +122,15 @@ def test_the_event_of_a_failsafe_ends_with_it(tmp_path: Path) -> None:
     )
     start = Instant(0.0, 1_800_000_000_000_000)
     model = VehicleModel(scenario, start.mono)
-    log = b""
+    log, sequence = b"", 0
     for tick in range(30 * 50):
         now = later(start, tick / 50)
         out = model.run(now)
         if tick == 15 * 50:
-            out.append(Outgoing(Event(1 << 24, 15_000, 1, 0, 0, 0x22, b""), 250))
-        log += b"".join(now.unix_us.to_bytes(8, "big") + outgoing.frame() for outgoing in out)
+            out.append(Outgoing(Event(1 << 24, 15_000, 1, 0, 0, 0x22, b""), 0))
+        for outgoing in out:
+            sequence = (sequence + 1) % 256
+            log += now.unix_us.to_bytes(8, "big") + outgoing._replace(seq=sequence).frame()
     lines = replayed(tmp_path / "event.tlog", log)
     at = {round(float(line["stamp"][17:-1]), 1): [error["code"] for error in line["errors"]] for line in lines}
     assert at[16.5] == [2000, 7002]

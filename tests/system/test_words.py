@@ -36,9 +36,10 @@ def log(tmp_path: Path) -> Path:
     data = b""
     for second in range(6):
         stamp = (1_800_000_000_000_000 + second * 1_000_000).to_bytes(8, "big")
-        data += stamp + MAVLink_heartbeat_message(10, 3, 65, 0, 4, 3).pack(mav)
         text = f"Yaw Imbalance {HOSTILE}".encode()[:50]
-        data += stamp + MAVLink_statustext_message(2, text).pack(mav)
+        for message in (MAVLink_heartbeat_message(10, 3, 65, 0, 4, 3), MAVLink_statustext_message(2, text)):
+            data += stamp + message.pack(mav)
+            mav.seq += 1
     path = tmp_path / f"f{CLIPBOARD}{FOLDED}\u202e.tlog"
     path.write_bytes(data)
     return path

@@ -84,7 +84,7 @@ def test_a_group_yields_messages_beside_those_of_its_members(port: int) -> None:
             heard = {next(found).handle for _ in range(30)}
     assert heard == {"robot", *members}
     assert of_group.detail.members == members
-    assert of_group.status.motion_possible is not TriState.TRUE  # the base is disarmed
+    assert of_group.status.motion_possible is TriState.TRUE  # the base is disarmed, and the arm can move
 
 
 def test_configured_publishers_run_too(tmp_path: pathlib.Path) -> None:

@@ -6,10 +6,8 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from ...gateway.observer import Observer
-from ...hardware.mavlink.identity import is_autopilot, named
+from ...hardware.mavlink.identity import is_autopilot
 from ...hardware.mavlink.state.applet import is_word, value_of
-from ...hardware.mavlink.state.boot_clock import APART
-from ...hardware.mavlink.state.claims import CLOCKS
 from ...hardware.mavlink.state.high_latency import stated
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
@@ -31,10 +29,6 @@ HEAD: Final = 4096
 MOST_SOURCES: Final = 64
 """Addresses with a parser of their own. All others share one."""
 MOST_SPEAKERS: Final = 256
-MOST_KINDS: Final = 4
-"""Limit of the kinds and boot times stored for one autopilot."""
-RETURNS: Final = 2
-"""This many returns to an earlier boot time prove two autopilots. A reboot never returns to one."""
 YEAR_2020_US: Final = 1_577_836_800_000_000
 """Earlier times are invalid: a vehicle without GPS starts at 1970."""
 
@@ -76,7 +70,7 @@ class Collector(Observer):
 
     def has_heartbeat(self) -> bool:
         """Whether a heartbeat of an autopilot was received."""
-        return any(sender.kinds for sender in self._components.values())
+        return any(sender.pilot for sender in self._components.values())
 
     def findings(
         self, base: Findings, statuses: Mapping[tuple[int, int], VehicleStatus], counters: Counters | None = None
@@ -102,17 +96,12 @@ class _Component:
 
     __slots__ = (
         "_applet",
-        "_boots",
         "_clock_off",
-        "_kind",
-        "_last",
         "_last_frame",
-        "_returns",
-        "_swaps",
         "_times",
         "frames",
         "heartbeat",
-        "kinds",
+        "pilot",
         "v1",
     )
 
@@ -121,13 +110,8 @@ class _Component:
         self._times: dict[int, tuple[int, float, float]] = {}
         """By message id: count, time of the first and of the last. Bounded by the list of known ids."""
         self.heartbeat: mav.Heartbeat | None = None
-        self.kinds: list[tuple[int, int]] = []
-        """The distinct pairs of autopilot and type in its heartbeats."""
-        self._kind = -1
-        self._swaps = 0
-        self._boots: list[float] = []
-        self._last = -1
-        self._returns = 0
+        self.pilot = False
+        """Whether one of its heartbeats is a vehicle's."""
         self._clock_off: float | None = None
         self._applet: tuple[int, float] | None = None
         """The last report of the applet, and when it came."""
@@ -147,37 +131,14 @@ class _Component:
             value = value_of(frame.message) if is_word(frame.message) else None
             if value is not None:
                 self._applet = value, now.mono
-        elif frame.message_id in CLOCKS:
+        elif type(frame.message) is mav.SystemTime:
             message = frame.message
-            self._note_boot_time(now.mono - message.time_boot_ms / 1000)
-            if type(message) is mav.SystemTime and message.time_unix_usec > YEAR_2020_US:
+            if message.time_unix_usec > YEAR_2020_US:
                 self._clock_off = (message.time_unix_usec - now.unix_us) / 1e6
 
     def _note_heartbeat(self, heartbeat: mav.Heartbeat, component: int) -> None:
-        """Note a heartbeat. Two autopilots with one id alternate; a single one never returns to an earlier type."""
         self.heartbeat = heartbeat
-        if not is_autopilot(heartbeat, component):
-            return
-        kind = heartbeat.autopilot, heartbeat.type
-        if kind not in self.kinds:
-            if len(self.kinds) >= MOST_KINDS:
-                return
-            self.kinds.append(kind)
-        elif self.kinds.index(kind) != self._kind:
-            self._swaps += 1
-        self._kind = self.kinds.index(kind)
-
-    def _note_boot_time(self, booted: float) -> None:
-        """Note a boot time. A return to an earlier one proves another autopilot; a reboot never returns."""
-        known = next((i for i, at in enumerate(self._boots) if abs(at - booted) < APART), None)
-        if known is None:
-            if len(self._boots) >= MOST_KINDS:
-                return
-            self._boots.append(booted)
-            known = len(self._boots) - 1
-        elif known != self._last:
-            self._returns += 1
-        self._last = known
+        self.pilot = self.pilot or is_autopilot(heartbeat, component)
 
     def speaker(self, ids: tuple[int, int], status: VehicleStatus | None) -> Speaker:
         """The summary of this component."""
@@ -193,17 +154,8 @@ class _Component:
             },
             frames=self.frames,
             frames_v1=self.v1,
-            pilot=bool(self.kinds),
-            conflict=self._conflict(),
+            pilot=self.pilot,
             clock_off=self._clock_off,
             applet=self._applet and AppletReport(self._applet[0], self._last_frame - self._applet[1]),
             status=status,
         )
-
-    def _conflict(self) -> str:
-        if self._swaps:
-            kinds = (f"{named(mav.AUTOPILOT_NAMES, a)} {named(mav.TYPE_NAMES, t)}" for a, t in sorted(self.kinds))
-            return "heartbeats that alternate between " + " and ".join(kinds)
-        if self._returns >= RETURNS:
-            return f"alternating clocks that started {max(self._boots) - min(self._boots):.0f} s apart"
-        return ""

@@ -108,7 +108,28 @@ def _pilots(f: Findings) -> tuple[Speaker, ...]:
 
 
 def _conflicting(f: Findings) -> tuple[Speaker, ...]:
-    return tuple(s for s in f.vehicles if s.conflict)
+    return tuple(s for s in f.vehicles if s.status is not None and s.status.strangers is not None)
+
+
+def _who_speaks(f: Findings) -> str:
+    one = _conflicting(f)[0]
+    who = one.status.strangers.who if one.status and one.status.strangers else ""
+    return f"two senders speak as vehicle {one.ids}: {who}"
+
+
+def _other_system(f: Findings) -> str:
+    status = _conflicting(f)[0].status
+    mine = status.strangers.mine if status and status.strangers else None
+    return OTHER_SYSTEM + (f"; if one of them is yours, name it: {mine}" if mine else "")
+
+
+def _late(f: Findings) -> tuple[Speaker, ...]:
+    return tuple(s for s in f.vehicles if s.status is not None and s.status.lag)
+
+
+def _how_late(f: Findings) -> str:
+    one = _late(f)[0]
+    return f"vehicle {one.ids} is heard {one.status.lag if one.status else 0:.1f} s late: what is that old is unknown"
 
 
 def _seldom(f: Findings) -> tuple[Speaker, ...]:
@@ -229,8 +250,13 @@ CASES: Final = (
          lambda f: f"write --system {_pilots(f)[0].system}, or give the vehicle the system id that is expected"),
     Case("two-vehicles", "two autopilots have the same ids",
          _conflicting,
-         lambda f: f"two autopilots use the ids {_conflicting(f)[0].ids}: {_conflicting(f)[0].conflict}",
-         lambda f: OTHER_SYSTEM,
+         _who_speaks,
+         _other_system,
+         spoils=True),
+    Case("late", "the vehicle is heard late: something on the way stores its frames",
+         _late,
+         _how_late,
+         lambda f: "look for a radio or a program that stores frames, and let the vehicle send fewer of them",
          spoils=True),
     Case("signed", "the frames are signed, and there is no key",
          lambda f: f.counters.signed and not f.signing,

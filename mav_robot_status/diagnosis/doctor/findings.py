@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from ...hardware.mavlink.identity import named
+from ...hardware.mavlink.senders import LATE, Sender, Strangers
 from ...hardware.mavlink.state.applet import FRESH
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
@@ -84,6 +85,15 @@ class VehicleStatus(NamedTuple):
     """What people call it."""
     can_run_applet: bool = False
     """Whether its autopilot is ArduPilot, which can run the applet."""
+    senders: tuple[Sender, ...] = ()
+    """Those that speak as it, if there are several or if it is late. The first one is believed."""
+    strangers: Strangers | None = None
+    """The evidence that two senders use its ids."""
+
+    @property
+    def lag(self) -> float:
+        """Seconds by which it is heard late; 0 if that is too little to matter."""
+        return self.senders[0].lag if self.senders and self.senders[0].lag > LATE else 0.0
 
 
 class Speaker(NamedTuple):
@@ -103,8 +113,6 @@ class Speaker(NamedTuple):
     frames_v1: int = 0
     pilot: bool = False
     """Whether it is a vehicle's autopilot."""
-    conflict: str = ""
-    """The evidence that two components use these ids; empty if there is none."""
     clock_off: float | None = None
     """Seconds by which its clock is ahead of ours; None if it does not know the time."""
     applet: AppletReport | None = None

@@ -15,8 +15,8 @@ from ...gateway.event_loop import EventLoop
 from ...gateway.recorded_log import Recording
 from ...gateway.replay import ReplayPipeline, run_through
 from ...hardware.mavlink.autopilots.wanted import COMMON
-from ...hardware.mavlink.message_table import WANTED_IDS
 from ...hardware.mavlink.requests.message_intervals import LOOK, wanted_of
+from ...hardware.mavlink.senders import senders, strangers
 from ...interface.explanation import explanation
 from ...links.url import parse
 from ...mavlink.component import DEFAULT_SYSTEM, Component
@@ -117,8 +117,8 @@ def _turn(config: Config, base: Findings, seconds: float, clock: Callable[[], In
 
 
 def _all_is_well(f: Findings) -> bool:
-    """Whether there is no fault, and every message that a status needs has arrived."""
-    return diagnose(f).cause == "ok" and not any(s.missing for s in f.vehicles)
+    """Whether there is no fault, every message that a status needs has arrived, and one sender speaks."""
+    return diagnose(f).cause == "ok" and not any(s.missing or (s.status and s.status.senders) for s in f.vehicles)
 
 
 # -- a recorded log ----------------------------------------------------------------------------------------------------
@@ -135,16 +135,13 @@ class _Whole(Recording):
         """The counters so far."""
         return self._parser.counters
 
-    def wanted_frames(self, collector: Collector) -> Iterator[Stamped]:
-        """The frames that the gateway reads. The collector gets all frames."""
+    def frames_for(self, collector: Collector) -> Iterator[Stamped]:
+        """All frames. The collector gets them too."""
         for stamped in self:
-            now, values, new_segment = stamped
-            if values is None:
-                yield stamped
-                continue
-            frame = Frame(*values)
-            collector.take(frame, now)
-            yield stamped if frame.message_id in WANTED_IDS else (now, None, new_segment)
+            now, values, _ = stamped
+            if values is not None:
+                collector.take(Frame(*values), now)
+            yield stamped
 
 
 def _read(config: Config, base: Findings) -> Findings:
@@ -153,7 +150,7 @@ def _read(config: Config, base: Findings) -> Findings:
     collector = Collector()
     listener = Listener()
     pipeline = ReplayPipeline(config, NO_OUTPUT, observers=[listener])
-    last = run_through(pipeline, recording.wanted_frames(collector))  # the first record is at 0
+    last = run_through(pipeline, recording.frames_for(collector))  # the first record is at 0
     known = dataclasses.replace(base, seconds=round(last.mono, 1))
     found = collector.findings(known, _statuses(pipeline.vehicles, last), recording.counters())
     handles = {tracked.ids: tracked.handle for tracked in pipeline.vehicles.vehicles}
@@ -187,4 +184,6 @@ def _status(hw: MavlinkRobotHW, tracked: TrackedVehicle, now: Instant) -> Vehicl
         costly=tracked.costly,
         name=tracked.name,
         can_run_applet=applet.can_run(state) and not tracked.costly,
+        senders=senders(tracked.belief, now.mono),
+        strangers=strangers(tracked.belief, now.mono, hw.options.heartbeat_timeout),
     )

@@ -110,6 +110,7 @@ def _vehicle(s: Speaker) -> Iterator[str]:
     if s.silent:
         until, silence = rfc3339(s.silent.until_us), duration(s.silent.silence)
         yield f"heard: for {s.silent.words}, until {until}; then silent for {silence}, so its status is unknown"
+    yield from (f"sender {sender.words}" for sender in s.status.senders)
     when = "status when it was last heard: " if s.silent else "status: "
     yield when + ", ".join(f"{name} {_word(value)}" for name, value in shown.fields.items())
     yield from applet_heard(s)
@@ -139,6 +140,7 @@ def _speaker(s: Speaker) -> JsonObject:
             "flight_mode": s.status.flight_mode,
             **({} if s.status.firmware is None else {"firmware": s.status.firmware}),
             **({} if s.status.name is None else {"name": s.status.name}),
+            **({"senders": [one._asdict() for one in s.status.senders]} if s.status.senders else {}),
             **s.status.fields,
             "errors": s.status.errors,
             "inhibits": s.status.inhibits,

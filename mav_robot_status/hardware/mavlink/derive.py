@@ -7,28 +7,27 @@ motion_possible FALSE. I3 error_code != 0 <=> in_error TRUE. I4 link stale => ev
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ...interface.fields import STATES
-from ...interface.status import Detail, Inhibit, LinkState, RobotStatus, Vehicle
+from ...interface.status import Detail, Inhibit, LinkState, RobotMode, RobotStatus, Vehicle
 from ...mavlink.definitions import AUTOPILOT_NAMES, STATE_NAMES, TYPE_NAMES
 from ...values import NamedTuple
 from . import causes
 from .identity import named
 from .rules import high_latency
 from .rules.arming import can_arm
-from .rules.claimed import agreed
+from .rules.claimed import CLAIMED
 from .rules.drives_powered import drives_powered, motion_possible
 from .rules.e_stopped import e_stopped
 from .rules.errors import active_errors, in_error
 from .rules.flight_mode import flight_mode
 from .rules.in_motion import in_motion
 from .rules.inhibits import inhibit, inhibits
-from .rules.reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
+from .rules.reason import TRUE, UNKNOWN, Reason, Source
 
 if TYPE_CHECKING:
     from ...clock import Instant
-    from ...interface.status import TriState
     from .autopilots.modes import FlightMode
     from .facts import Facts, Seldom
     from .options import HardwareOptions
@@ -42,83 +41,77 @@ class Derived(NamedTuple):
     reasons: Mapping[str, Reason]
 
 
-LOST: Final = Reason("no heartbeat within heartbeat_timeout", Source.HEARTBEAT)
+LATE: Final = Reason("frames arrive, but the latest HEARTBEAT is old", Source.HEARTBEAT)
+LOST: Final = Reason("no frame within heartbeat_timeout", Source.HEARTBEAT)
 
 
 def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, options: HardwareOptions) -> Derived:
     """The status of the vehicle with these (system, component) ids at `now`; `before` is the previous detail."""
-    if not facts.fresh.heartbeat:
+    if not facts.fresh.heartbeat and not facts.fresh.link:
         return _lost(facts, ids, before, now, options)
     mode = flight_mode(facts, options)
     found = _seldom(facts.seldom, facts, options, mode) if facts.seldom else _found(facts, options, mode)
-    (stopped, why_stopped), (drives, why_drives), (possible, why_possible), (moving, why_moving) = found
-    why_mode, doubted = Reason(mode.rule, Source.MODE_NUMBER), facts.claimed.doubted
-    if doubted:
-        known = agreed(facts.claimed, mode.mode, drives)
-        mode, why_mode = mode._replace(mode=known.mode[0]), known.mode[1]
-        (stopped, why_stopped), (drives, why_drives) = known.e_stopped, known.drives_powered
-        (possible, why_possible), (moving, why_moving) = known.motion_possible, known.in_motion
     errors = active_errors(facts)
-    wrong, why_wrong = in_error(facts, errors)
-    status = RobotStatus(
-        mode=mode.mode,
-        e_stopped=stopped,
-        drives_powered=drives,
-        motion_possible=possible,
-        in_motion=moving,
-        in_error=wrong,
-        error_code=errors[0].cause.code if errors else 0,
-    )
+    found["mode"], found["in_error"] = (mode.mode, Reason(mode.rule, Source.MODE_NUMBER)), in_error(facts, errors)
+    hidden = _hidden(facts)
+    if hidden is not None:
+        name, why, fields = hidden
+        found |= dict.fromkeys(fields, (UNKNOWN, why)) | {"mode": (RobotMode.UNKNOWN, why)}
+    status = RobotStatus(**{field: value for field, (value, _) in found.items()})
+    status = status._replace(error_code=errors[0].cause.code if errors and status.in_error is TRUE else 0)
+    if status.motion_possible is TRUE:
+        inhibited: tuple[Inhibit, ...] = ()
+    elif hidden is not None:
+        inhibited = (inhibit(name, None, before, now),)
+    else:
+        inhibited = inhibits(facts, options, mode, found["e_stopped"], before, now)
     detail = Detail(
         system=ids[0],
         component=ids[1],
         errors=tuple(error.cause for error in errors),
-        inhibits=_why_not(facts, possible, options, mode, (stopped, why_stopped), before, now),
-        vehicle=_vehicle(facts) if doubted and not facts.claimed.one_mode else _running(facts, mode),
+        inhibits=inhibited,
+        vehicle=_running(facts, mode) if hidden is None else _vehicle(facts),
         link=LinkState.CONNECTED,
     )
-    reasons = {
-        "mode": why_mode,
-        "e_stopped": why_stopped,
-        "drives_powered": why_drives,
-        "motion_possible": why_possible,
-        "in_motion": why_moving,
-        "in_error": why_wrong,
-    }
-    return Derived(status, detail, reasons)
+    return Derived(status, detail, {field: reason for field, (_, reason) in found.items()})
 
 
-def _found(facts: Facts, options: HardwareOptions, mode: FlightMode) -> tuple[Finding, Finding, Finding, Finding]:
+Hidden = tuple[str, Reason, "tuple[str, ...]"]
+"""Why fields are unknown: the inhibit, the reason, and the fields beside the mode."""
+
+
+def _hidden(facts: Facts) -> Hidden | None:
+    """What cannot be known, although frames arrive: what rests on a late HEARTBEAT, or on one of two vehicles."""
+    fresh = facts.fresh
+    if facts.claimed.mixed:
+        return "SENDER_UNCERTAIN", CLAIMED, ("e_stopped", "drives_powered", "motion_possible", "in_motion")
+    if fresh.heartbeat:
+        return None
+    moves = () if fresh.velocity is not None or fresh.landed_state or fresh.gps else ("in_motion",)
+    return "HEARTBEAT_LATE", LATE, ("e_stopped", "drives_powered", "motion_possible", *moves)
+
+
+def _found(facts: Facts, options: HardwareOptions, mode: FlightMode) -> dict[str, tuple[Any, Reason]]:
     """e_stopped, drives_powered, motion_possible and in_motion of a vehicle that sends HEARTBEATs."""
     stopped = e_stopped(facts, options)
     drives = drives_powered(facts, options, *stopped)
-    return stopped, drives, motion_possible(facts, options, mode, *drives), in_motion(facts, options)
+    return {
+        "e_stopped": stopped,
+        "drives_powered": drives,
+        "motion_possible": motion_possible(facts, options, mode, *drives),
+        "in_motion": in_motion(facts, options),
+    }
 
 
-def _seldom(
-    told: Seldom, facts: Facts, options: HardwareOptions, mode: FlightMode
-) -> tuple[Finding, Finding, Finding, Finding]:
+def _seldom(told: Seldom, facts: Facts, options: HardwareOptions, mode: FlightMode) -> dict[str, tuple[Any, Reason]]:
     """The same for a vehicle that is heard only through HIGH_LATENCY2."""
     drives = high_latency.drives_powered(told, facts, options)
-    possible = high_latency.motion_possible(facts, options, mode, drives)
-    return high_latency.e_stopped(options), drives, possible, high_latency.in_motion(told)
-
-
-def _why_not(
-    facts: Facts,
-    possible: TriState,
-    options: HardwareOptions,
-    mode: FlightMode,
-    stopped: Finding,
-    before: Detail,
-    now: Instant,
-) -> tuple[Inhibit, ...]:
-    """The inhibits. While senders differ, what one of them says is not a reason."""
-    if possible is TRUE:
-        return ()
-    if facts.claimed.doubted and possible is not FALSE:
-        return (inhibit("SENDER_UNCERTAIN", None, before, now),)
-    return inhibits(facts, options, mode, stopped, before, now)
+    return {
+        "e_stopped": high_latency.e_stopped(options),
+        "drives_powered": drives,
+        "motion_possible": high_latency.motion_possible(facts, options, mode, drives),
+        "in_motion": high_latency.in_motion(told),
+    }
 
 
 def _lost(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, options: HardwareOptions) -> Derived:

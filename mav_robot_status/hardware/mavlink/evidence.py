@@ -137,10 +137,7 @@ def _parts(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
 
 
 def _claims(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
-    claims = state.claims
-    if claims.conflict is not None:
-        return claims.conflict.why, claims.conflict.last
-    return "HEARTBEAT.base_mode of another sender", max((claim.at for claim in claims.others.values()), default=None)
+    return "the HEARTBEATs of several senders", None
 
 
 def _esc(state: VehicleState, facts: Facts, reason: Reason) -> Shown:

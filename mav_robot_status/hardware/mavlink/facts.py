@@ -43,6 +43,10 @@ class Fresh(NamedTuple):
     """The name of the message that gives the speed."""
     global_position: bool
     gps: bool
+    link: bool
+    """Whether any news arrived lately, so that the link is connected."""
+    arming_told: bool
+    """Whether an arming was announced after the latest HEARTBEAT."""
 
 
 class Movement(NamedTuple):
@@ -137,15 +141,12 @@ class SensorFault(NamedTuple):
 
 
 class Claimed(NamedTuple):
-    """Whether another sender claims the ids of the vehicle, and on what all agree."""
+    """Whether two vehicles use the ids. `belief` decides that, not the state."""
 
     conflict_since: int | None
     """Unix microseconds. None: no conflict."""
-    doubted: bool
-    """Whether mode, power, motion and e-stop are unknown unless all agree."""
-    all_armed: bool
-    all_disarmed: bool
-    one_mode: bool
+    mixed: bool
+    """Whether the two cannot be told apart, so that nothing is known."""
 
 
 class Seldom(NamedTuple):

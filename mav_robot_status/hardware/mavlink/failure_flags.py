@@ -16,8 +16,8 @@ from ...values import NamedTuple
 from . import causes
 from .autopilots.sensor_weights import bit_of
 from .identity import sensor_name
-from .state.boot_clock import GRACE
 from .state.high_latency import is_ardupilots_own
+from .state.sensors import GRACE
 
 if TYPE_CHECKING:
     from ...mavlink.definitions import Heartbeat

@@ -1,6 +1,10 @@
 """`MavlinkRobotHW`: the hardware interface. It processes frames, keeps the state of each vehicle, and sets the handles.
 
 The cycle of ros_control: `take` each frame, `read(time)` into the handles, then send the `due_requests(time)`.
+
+Every frame takes one path. `belief` says who spoke, and when; a handler changes the state of that speaker; the vehicle
+is due: at once after an edge (armed, a text, an acknowledgement), else at most SETTLES later. `read` then settles all
+its facts, and derives a status if they have changed.
 """
 
 from __future__ import annotations
@@ -13,55 +17,46 @@ from ...due_times import DueTimes
 from ...interface import LinkState, RobotHW
 from ...mavlink import definitions as mav
 from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
-from .armed import may_move
 from .autopilots.wanted import METADATA
-from .derive import derive
+from .belief import Belief
 from .evidence import EvidenceOfVehicle
-from .handlers import overheard, pass_time, transmitter_heard
-from .handlers.heartbeat import changed_way
-from .handlers.high_latency import follows, high_latency, sends_heartbeats
+from .handlers import overheard, transmitter_heard
 from .handlers.parts import TRANSMITTERS
 from .identity import is_autopilot, named
 from .message_table import (
     APPLET_ID,
     ARM_STATUS_ID,
     COMMAND_IDS,
+    EDGES,
     FILE_IDS,
     HEARTBEAT_ID,
     HIGH_LATENCY_ID,
-    KINDS,
-    PLAIN,
 )
-from .moment import Moment
 from .options import HardwareOptions
 from .places import Places
 from .requests.scheduler import Ask, RequestScheduler
 from .rules.inhibits import inhibit
-from .settle import claimed, facts_of
-from .state import motion
 from .state.applet import is_word
-from .state.claims import BESIDE, CLOCKS, CONTINUES, COUNTED_APART, Claims, Outcome, are_alike, says_alike
-from .state.high_latency import LEAST_TIMEOUT, stated
-from .state.latest_messages import SILENCE
-from .state.vehicle_state import begin, timeout_of
+from .state.high_latency import stated
+from .update import on_frame, status_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Container, Iterator, Sequence
+    from collections.abc import Callable, Collection, Container, Hashable, Iterator, Sequence
 
     from ...clock import Instant
     from ...mavlink.framing import Values
+    from .derive import Derived
     from .facts import Facts
-    from .message_table import Settles
     from .px4_events import EventTable
     from .state.vehicle_state import VehicleState
     from .vehicle import ExpectedVehicle, Names, TrackedVehicle
 
 log = logging.getLogger(__name__)
 
-Stamped = tuple["Instant", Any, bool]
-"""A record of a log: its time, its frame (`Values`; None at the end), and whether it starts a new segment."""
-LOG_WAYS: Final = 10.0
-"""Seconds between two log lines about the way of one vehicle."""
+LEAST_WAIT: Final = 1e-3
+"""Seconds to the next look at a vehicle, at least: sums of times are rounded."""
+SETTLES: Final = 0.05
+"""Seconds after which a message that is no edge is in the status."""
 
 
 class MavlinkRobotHW(RobotHW):
@@ -72,28 +67,21 @@ class MavlinkRobotHW(RobotHW):
         options: HardwareOptions | None = None,
         slots: Sequence[ExpectedVehicle] = (),
         own_component: int = 192,
-        claims: dict[tuple[int, int], Claims[Any]] | None = None,
+        beliefs: dict[tuple[int, int], Belief] | None = None,
         names: Names | None = None,
     ) -> None:
-        """`claims`: who speaks with the ids of each vehicle. Another part may look at it."""
+        """`beliefs`: who speaks with the ids of each vehicle. Another part may look at it."""
         super().__init__()
-        self.claims = {} if claims is None else claims
         self.options = options or HardwareOptions()
         self._asking = RequestScheduler(self.options.watch_outputs, own_component, self.options.request_events)
-        self._places = Places(slots, self.handles, self.claims, names or {})
+        self._places = Places(slots, self.handles, {} if beliefs is None else beliefs, names or {})
         self._tracked = self._places.tracked
-        self._short_timeouts = min(self.options.heartbeat_timeout, self.options.sys_status_timeout) < SILENCE
-        """Whether a message can become too old within SILENCE. Then every message can make its kind fresh again."""
         self._due: DueTimes[TrackedVehicle] = DueTimes()
-        """The deadline of each vehicle: `next` of its moment. inf while it is in `dirty_vehicles`."""
-        self.dirty_vehicles: list[TrackedVehicle] = []
-        """The vehicles whose facts may have changed since the last `read`."""
-        self.deadline = math.inf
-        """The first deadline of all vehicles, monotonic seconds. -inf while a vehicle is in `dirty_vehicles`."""
+        """When the status of each vehicle may change. -inf: at once."""
         self.asks = False
         """Whether `due_requests` is called at all."""
         self.hear_file: Callable[[TrackedVehicle, Any, float], None] | None = None
-        """Called with each message that brings a file or its place, from the selected way of a vehicle."""
+        """Called with each message of a vehicle that brings a file or its place."""
         self._event_table: EventTable | None = None
         """The words for the events of each vehicle without its own table."""
         self._event_tables: dict[tuple[int, int], EventTable] = {}
@@ -101,10 +89,13 @@ class MavlinkRobotHW(RobotHW):
         """Whether the handles of vehicles that sent nothing still lack their inhibit LINK_STALE."""
         self.ignored = 0
         """Heartbeats of autopilots that no entry of the configuration names, or beyond MOST_VEHICLES."""
-        self.link_timeout: Callable[[Any], float | None] | None = None
-        """The timeout that the site gives to the link of a way, in seconds. None: it gives none to any link."""
         self.ignored_words = 0
         """Words of the applet (RS_STOP) from a sender that is not a vehicle."""
+
+    @property
+    def deadline(self) -> float:
+        """When (monotonic seconds) `read` has work. -inf: at once."""
+        return min(self._due.first, self._places.expire_at)
 
     @property
     def vehicles(self) -> Iterator[TrackedVehicle]:
@@ -134,174 +125,79 @@ class MavlinkRobotHW(RobotHW):
             self._give_event_table(tracked)
 
     def _give_event_table(self, tracked: TrackedVehicle) -> None:
-        state, ids = tracked.state, tracked.ids
-        if state is None or ids is None:
+        table = self._event_tables.get(tracked.ids or (0, 0), self._event_table)
+        if tracked.event_table is table:
             return
-        table = self._event_tables.get(ids, self._event_table)
-        if state.event_table is not table:
-            state.event_table = table
-            if not tracked.dirty:
-                self._mark_dirty(tracked)
+        tracked.event_table = table
+        for speaker in tracked.belief.speakers:
+            if speaker.state is not None:
+                speaker.state.event_table = table
+        self._touch(tracked, -math.inf)
 
-    def take(self, frame: Values, now: Instant, way: Any = None) -> TrackedVehicle | None:
-        """Process one frame that arrived on `way`: a channel, or None if there is only one.
+    def take(self, frame: Values, now: Instant, source: Hashable = None, lag: float = 0.0) -> TrackedVehicle | None:
+        """Process one frame. `source`: where it arrived; None if there is one place only.
 
-        Returns the vehicle if the frame is a heartbeat of its autopilot on its selected way, else None.
+        `lag`: how late it is by its signature, seconds. Returns the vehicle if the frame is a heartbeat of its
+        autopilot, and news of its main speaker; else None.
         """
-        message_id, ids, sequence, message, _, _ = frame
-        try:
-            handler, settles = KINDS[message_id]
-        except KeyError:
-            if message_id in COMMAND_IDS:
-                self._overhear(message, ids, now)
-            elif message_id == HIGH_LATENCY_ID:
-                self._take_high_latency(frame, now, way)
-            elif message_id in FILE_IDS:
-                self._hear_file(message, ids, now, way)
-            return None
+        message_id, ids, _, message, _, _ = frame
+        if message_id in COMMAND_IDS and message is not None:
+            self._overhear(message, ids, now)
         tracked = self._tracked.get(ids)
-        if tracked is not None:
-            claims = tracked.claims
-            if claims.way is not way:
-                if not self._is_heard_elsewhere(tracked, frame, now, way):
-                    return None
-            elif message_id != COUNTED_APART:
-                if (sequence - claims.sequence) & 255 > CONTINUES:
-                    claims.broken = True
-                claims.sequence = sequence
-        sender = None
+        if tracked is None:
+            tracked = self._first_heard(frame, now)
+            if tracked is None:
+                return None
+        _, speaker, said = on_frame(tracked, frame, source, now, lag, self.options)
+        if speaker is None:
+            if message_id == HEARTBEAT_ID:
+                self._touch(tracked, -math.inf)
+            return None
+        self._touch(tracked, -math.inf if message_id in EDGES else now.mono + SETTLES)
+        if said is None or speaker is not tracked.belief.main:
+            return None
         if message_id == HEARTBEAT_ID:
-            tracked = sender = self._vehicle_of(tracked, frame, now, way)
-        if tracked is None:
-            if message_id == ARM_STATUS_ID and ids[1] in TRANSMITTERS:
-                self._hear_transmitter(message, ids, now)
-            elif message_id == APPLET_ID and is_word(message):
-                self.ignored_words += 1
-            return None
-        state = tracked.state
-        if state is None:
-            if sender is not None:
-                tracked.state = begin(message, now, tracked.claims)
-                self._mark_dirty(tracked)
-                self._give_event_table(tracked)
-            return sender
-        if tracked.requests is not None and sender is None:
+            if not is_autopilot(message, ids[1]):
+                return None
+            tracked.handle.heard_at = said.mono
+            return tracked
+        if message_id == HIGH_LATENCY_ID:
+            _note_statement(tracked)
+        elif message_id in FILE_IDS:
+            self._hear_file(tracked, message, now)
+        elif tracked.requests is not None:
             self._asking.heard(tracked, message, message_id, now.mono)
-        unchanged = handler(state, message, now, self.options)
-        if tracked.dirty:
-            return sender
-        if not unchanged or state.latest.unsettled or not tracked.connected or now.mono >= tracked.deadline:
-            self._settle(tracked, state, settles, now)
-        return sender
+        return None
 
-    def take_all(self, records: Iterator[Stamped], last: Instant, until: float) -> tuple[Instant, Stamped | None]:
-        """Take the records of a log before `until` (monotonic seconds) while nothing else is due.
-
-        Returns the time of the last one taken (`last` if none was), and the first record that is not taken. That is
-        None at the end of the log, or if a vehicle is in `dirty_vehicles` now. Nearly every frame of a log takes the
-        short way here: it does what `take` does with a message that concerns only the state of its vehicle.
-        """
-        options = self.options
-        limit = min(until, self.deadline)
-        known: tuple[int, int] | None = None
-        tracked: TrackedVehicle | None = None
-        state: VehicleState | None = None
-        for record in records:
-            now, frame, new_segment = record
-            if new_segment or frame is None or now.mono >= limit:
-                return last, record
-            last = now
-            message_id, ids, sequence, message, _, _ = frame
-            if ids is not known:
-                known, tracked = ids, self._connected(ids)
-                state = None if tracked is None else tracked.state
-            if tracked is not None and state is not None and message_id in PLAIN:
-                claims = tracked.claims
-                if (sequence - claims.sequence) & 255 > CONTINUES:
-                    claims.broken = True
-                claims.sequence = sequence
-                if PLAIN[message_id](state, message, now, options) and not state.latest.unsettled:
-                    continue
-                self._settle(tracked, state, KINDS[message_id][1], now)
-            else:
-                known = None
-                self.take(frame, now)
-            if self.dirty_vehicles:
-                return last, None
-            limit = min(until, self.deadline)
-        return last, None
-
-    def _connected(self, ids: tuple[int, int]) -> TrackedVehicle | None:
-        """The vehicle of a log with these ids, if its heartbeats arrive."""
-        tracked = self._tracked.get(ids)
-        if tracked is None or tracked.state is None or not tracked.connected:
+    def _first_heard(self, frame: Values, now: Instant) -> TrackedVehicle | None:
+        """The vehicle of an autopilot that sends its first HEARTBEAT or HIGH_LATENCY2; None for every other frame."""
+        message_id, ids, _, message, _, _ = frame
+        if message is None:
             return None
-        return tracked if tracked.claims.way is None and tracked.requests is None else None
+        if message_id == HEARTBEAT_ID and is_autopilot(message, ids[1]):
+            return self._discover(ids, message, now)
+        if message_id == HIGH_LATENCY_ID and is_autopilot(stated(message), ids[1]):
+            return self._discover(ids, stated(message), now)
+        if message_id == ARM_STATUS_ID and ids[1] in TRANSMITTERS:
+            self._hear_transmitter(message, ids, now)
+        elif message_id == APPLET_ID and is_word(message):
+            self.ignored_words += 1
+        return None
 
-    def _settle(self, tracked: TrackedVehicle, state: VehicleState, settles: Settles, now: Instant) -> None:
-        """Settle the facts that a message may have changed."""
-        if state.latest.unsettled:
-            if not tracked.dirty:
-                self._mark_dirty(tracked)
-            return
-        facts, moment = tracked.facts, tracked.moment
-        moment.now = now.mono
-        for place, settle in settles:
-            if settle(state, moment, self.options) != facts[place]:
-                self._mark_dirty(tracked)
-                return
-        if moment.next < tracked.deadline:
-            self._set_deadline(tracked, moment.next)
-
-    def _take_high_latency(self, frame: Values, now: Instant, way: Any) -> None:
-        """Process a HIGH_LATENCY2: as a HEARTBEAT, if no HEARTBEAT arrives, else as a claim."""
-        _, ids, sequence, message, _, _ = frame
-        beat: Values = (HEARTBEAT_ID, ids, sequence, stated(message), *frame[4:])
-        if not is_autopilot(beat[3], ids[1]):
-            return
-        tracked = self._tracked.get(ids)
-        state = None if tracked is None else tracked.state
-        if tracked is not None and state is not None:
-            claims = tracked.claims
-            if sends_heartbeats(state, now.mono, self.options):
-                claims.beside(beat[3], sequence, way, now)
-                self._settle_claims(tracked, now)
-                return
-            claims.lasts = max(LEAST_TIMEOUT, timeout_of(state, self.options))
-            if claims.way is way and not follows(state, message):
-                if may_move(beat[3]):  # late, or of another vehicle on this way
-                    claims.claim((BESIDE, way), way, beat[3], sequence, now)
-                    self._settle_claims(tracked, now)
-                return
-        if tracked is not None and tracked.claims.way is not way:
-            if not self._is_heard_elsewhere(tracked, beat, now, way):
-                return
-        elif tracked is not None:
-            tracked.claims.follow_own(sequence)
-        tracked = self._vehicle_of(tracked, beat, now, way)
-        if tracked is None:
-            return
-        if tracked.state is None:
-            tracked.state = begin(beat[3], now, tracked.claims)
-        high_latency(tracked.state, message, now, self.options)
-        if not tracked.dirty:
-            self._mark_dirty(tracked)
+    def _touch(self, tracked: TrackedVehicle, due: float) -> None:
+        """Let the next `read` at `due` or later settle the facts of a vehicle."""
+        if not tracked.touched or due < tracked.due:
+            tracked.touched, tracked.due = True, min(due, tracked.due)
+            self._due.set(tracked, tracked.due)
 
     def read(self, now: Instant) -> None:
         """Update the handles to `now`."""
         if self._unheard:
             self._report_unheard(now)
-        if now.mono >= self.deadline:
-            if now.mono >= self._places.expire_at and (gone := self._places.expired(now.mono, self.options)):
-                self._remove(gone)
-            while (tracked := self._look_again(now.mono)) is not None:
-                self._mark_dirty(tracked)
-            self._find_deadline()
-        if self.dirty_vehicles:
-            for tracked in self.dirty_vehicles:
-                self._evaluate(tracked, now)
-            self.dirty_vehicles.clear()
-            self._find_deadline()
+        if now.mono >= self._places.expire_at and (gone := self._places.expired(now.mono, self.options)):
+            self._remove(gone)
+        while self._due.first <= now.mono:
+            self._update(self._due.first_key(), now)
 
     @property
     def requests_due(self) -> float:
@@ -312,7 +208,7 @@ class MavlinkRobotHW(RobotHW):
         """Update the evidence in a handle to `now`; `read` updates it only when a status may have changed."""
         for tracked in self._tracked.values():
             if tracked.handle.name == handle:
-                self._evaluate(tracked, now)
+                self._update(tracked, now)
 
     def due_requests(
         self,
@@ -343,18 +239,8 @@ class MavlinkRobotHW(RobotHW):
         return [line for tracked in self._tracked.values() if (line := self._asking.waits_for(tracked)) is not None]
 
     def next_due(self, until: float = -math.inf) -> float:
-        """When (monotonic seconds) `read` or `due_requests` has work. -inf: now, because of a frame.
-
-        A time before `until` is exact. A later time is a lower bound: newer messages may postpone it.
-        """
-        if self.deadline <= until and not self.dirty_vehicles:
-            self._look_again(min(until, self._asking.next_due) if self.asks else until)
-            self._find_deadline()
-        if self.asks:
-            due = self._asking.next_due
-            if due < self.deadline:
-                return due
-        return self.deadline
+        """When (monotonic seconds) `read` or `due_requests` has work. -inf: now, because of a frame."""
+        return min(self.deadline, self._asking.next_due) if self.asks else self.deadline
 
     def adopt(self, other: MavlinkRobotHW) -> None:
         """Adopt the vehicles of another interface, with the options and slots of this one. Do not use `other` again.
@@ -363,17 +249,15 @@ class MavlinkRobotHW(RobotHW):
         """
         self._places.expire_at = -math.inf
         for ids, theirs in other._tracked.items():
-            tracked = None if theirs.state is None else self._places.place(ids)
+            tracked = None if theirs.state is None else self._places.place(ids, theirs.belief)
             if tracked is None:
                 continue
             ours = tracked.handle
             ours.status, ours.detail, ours.heard_at = theirs.handle.status, theirs.handle.detail, theirs.handle.heard_at
-            tracked.state, tracked.boots, tracked.losses = theirs.state, theirs.boots, theirs.losses
-            tracked.established = theirs.established
+            tracked.boots, tracked.losses = theirs.boots, theirs.losses
+            tracked.established, tracked.event_table = theirs.established, theirs.event_table
             tracked.requests, tracked.parameters = theirs.requests, theirs.parameters
-            if self.link_timeout is None:
-                tracked.claims.timeout = None
-            self._mark_dirty(tracked)
+            self._touch(tracked, -math.inf)
             if ids in other._event_tables:
                 self._event_tables[ids] = other._event_tables[ids]
             self._give_event_table(tracked)
@@ -386,9 +270,7 @@ class MavlinkRobotHW(RobotHW):
         for tracked in self._tracked.values():
             if tracked.ids not in keep:
                 tracked.forget()
-                self._set_deadline(tracked, math.inf)
-        self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked.dirty]
-        self._find_deadline()
+                self._due.set(tracked, math.inf)
         self._unheard = True
 
     def _report_unheard(self, now: Instant) -> None:
@@ -407,8 +289,8 @@ class MavlinkRobotHW(RobotHW):
             if addressed and tracked.state is not None:
                 before = tracked.state.stop
                 overheard(tracked.state, message, sender, now)
-                if tracked.state.stop is not before and not tracked.dirty:
-                    self._mark_dirty(tracked)
+                if tracked.state.stop is not before:
+                    self._touch(tracked, -math.inf)
 
     def _hear_transmitter(self, message: mav.OpenDroneIdArmStatus, sender: tuple[int, int], now: Instant) -> None:
         """Note what a Remote ID transmitter says to the autopilot of its system."""
@@ -416,51 +298,29 @@ class MavlinkRobotHW(RobotHW):
             if system == sender[0] and tracked.state is not None:
                 before = tracked.state.faulty_parts
                 transmitter_heard(tracked.state, message, sender[1], now)
-                if tracked.state.faulty_parts is not before and not tracked.dirty:
-                    self._mark_dirty(tracked)
+                if tracked.state.faulty_parts is not before:
+                    self._touch(tracked, -math.inf)
 
-    def _hear_file(self, message: Any, sender: tuple[int, int], now: Instant, way: Any) -> None:
+    def _hear_file(self, tracked: TrackedVehicle, message: Any, now: Instant) -> None:
         """Hand on where a table of events is, or a piece of it."""
-        tracked = self._tracked.get(sender)
-        if tracked is None or tracked.claims.way is not way:
-            return
         if type(message) is mav.ComponentMetadata and tracked.requests is not None:
             tracked.requests.delivered(METADATA.id)
         if self.hear_file is not None:
             self.hear_file(tracked, message, now.mono)
 
-    def _vehicle_of(
-        self, tracked: TrackedVehicle | None, frame: Values, now: Instant, way: Any
-    ) -> TrackedVehicle | None:
-        """The vehicle whose autopilot sent this heartbeat; None if it is not from an autopilot."""
-        _, ids, sequence, heartbeat, _, _ = frame
-        if not is_autopilot(heartbeat, ids[1]):
-            return None
-        if tracked is None:
-            tracked = self._discover(frame, now, way)
-        if tracked is not None:
-            tracked.handle.heard_at = now.mono
-            claims = tracked.claims
-            if self.link_timeout is not None:
-                claims.timeout = self.link_timeout(way)
-            claims.heard(heartbeat, sequence, way, now)
-            if claims.news is not None:
-                self._log_conflict(tracked)
-        return tracked
-
-    def _discover(self, frame: Values, now: Instant, way: Any) -> TrackedVehicle | None:
+    def _discover(self, ids: tuple[int, int], heartbeat: mav.Heartbeat, now: Instant) -> TrackedVehicle | None:
         """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
-        _, ids, _, heartbeat, _, _ = frame
         gone = self._places.room_for(ids, now.mono, self.options)
         if gone:
             self._remove(gone)
-        tracked = (None if gone is None else self._places.place(ids)) or self._succeed(frame, now, way)
+        tracked = (None if gone is None else self._places.place(ids)) or self._succeed(ids)
         if tracked is None:
             self.ignored += 1
             return None
         names = named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), named(mav.TYPE_NAMES, heartbeat.type)
         called = "" if tracked.name is None else f" '{tracked.name}'"
         log.info("heard vehicle %d.%d%s (%s, %s): handle '%s'", *ids, called, *names, tracked.handle.name)
+        self._give_event_table(tracked)
         return tracked
 
     def _remove(self, gone: list[TrackedVehicle]) -> None:
@@ -469,169 +329,62 @@ class MavlinkRobotHW(RobotHW):
             if tracked.ids is not None:
                 self._event_tables.pop(tracked.ids, None)
             self._places.remove(tracked)
-            self._set_deadline(tracked, math.inf)
+            self._due.set(tracked, math.inf)
         self._unheard = self.changed = True
-        self.dirty_vehicles = [tracked for tracked in self.dirty_vehicles if tracked not in gone]
-        self._find_deadline()
 
-    def _succeed(self, frame: Values, now: Instant, way: Any) -> TrackedVehicle | None:
-        """The vehicle whose entry leaves the ids open, if this sender takes it over from the one before.
+    def _succeed(self, ids: tuple[int, int]) -> TrackedVehicle | None:
+        """The vehicle whose entry leaves the component open, if this sender takes it over from the one before.
 
-        Component 1 is the autopilot: it takes the entry at once from another component of its system, and what that one
-        says stays a claim. Any other component of the system is a claim itself.
+        Component 1 is the autopilot: it takes the entry at once from another component of its system, but not from one
+        that is armed.
         """
-        _, ids, sequence, heartbeat, _, _ = frame
+        if ids[1] != MAV_COMP_ID_AUTOPILOT1:
+            return None
         for tracked in self._places.expected:
             owner = tracked.ids
-            if owner is None or tracked.slot.component is not None or tracked.slot.system not in (None, ids[0]):
+            if owner is None or tracked.slot.component is not None or owner[0] != ids[0] or _is_armed(tracked):
                 continue
-            same_system = owner[0] == ids[0]
-            if same_system and ids[1] == MAV_COMP_ID_AUTOPILOT1:
-                log.info("vehicle %d.%d: its handle '%s' is now that of %d.%d", *owner, tracked.handle.name, *ids)
-                former = tracked.claims.mine
-                tracked.forget()
-                self._set_deadline(tracked, math.inf)
-                tracked.requests = tracked.parameters = None
-                self._places.give(tracked, ids)
-                if former is not None:
-                    tracked.claims.others[owner] = former
-                return tracked
-            if same_system:
-                tracked.claims.claim(ids, way, heartbeat, sequence, now)
-                self._settle_claims(tracked, now)
+            log.info("vehicle %d.%d: its handle '%s' is now that of %d.%d", *owner, tracked.handle.name, *ids)
+            tracked.forget()
+            self._due.set(tracked, math.inf)
+            tracked.requests = tracked.parameters = None
+            self._places.give(tracked, ids)
+            return tracked
         return None
 
-    def _is_heard_elsewhere(self, tracked: TrackedVehicle, frame: Values, now: Instant, way: Any) -> bool:
-        """Whether a frame that is not from the selected way counts: only a heartbeat that selects its way does."""
-        message_id, ids, sequence, message, _, _ = frame
-        claims, state = tracked.claims, tracked.state
-        if claims.mine is None:
-            return True
-        if message_id != COUNTED_APART:
-            claims.follow(way, sequence)
-        booted = state.boot.at if state is not None and state.boot.clock_ms is not None else None
-        if message_id == HEARTBEAT_ID and is_autopilot(message, ids[1]):
-            before, former = claims.way, claims.mine
-            outcome = claims.elsewhere(message, sequence, way, now, booted, tracked.timeout(self.options))
-            if outcome is not Outcome.UNUSED:
-                if outcome is Outcome.EXCHANGED:
-                    log.warning("vehicle %d.%d: another vehicle has these ids now, on %s", *ids, way)
-                    tracked.state, tracked.boots = None, 0
-                    tracked.requests = tracked.parameters = None
-                else:
-                    known = claims.mine.booted if claims.mine else None
-                    if state is not None and not (are_alike(known, booted) and says_alike(former.heartbeat, message)):
-                        changed_way(state, now.mono)
-                    if now.mono >= tracked.log_way_at:
-                        log.info("vehicle %d.%d: now heard on %s, no longer on %s", *ids, way, before)
-                tracked.log_way_at = now.mono + LOG_WAYS
-                return True
-        elif message_id in CLOCKS:
-            claims.clock(way, now.mono - message.time_boot_ms / 1000, booted, now)
-        else:
-            return False
-        self._settle_claims(tracked, now)
-        return False
-
-    def _settle_claims(self, tracked: TrackedVehicle, now: Instant) -> None:
-        """After a message of another sender."""
-        self._log_conflict(tracked)
+    def _update(self, tracked: TrackedVehicle, now: Instant) -> None:
+        """Update the handle of a vehicle to `now`."""
+        before = tracked.state
+        updated = status_at(tracked, now, self.options)
+        tracked.touched, tracked.due = False, math.inf if updated is None else max(updated.due, now.mono + LEAST_WAIT)
+        self._due.set(tracked, tracked.due)
         state = tracked.state
-        if state is None or tracked.dirty or not tracked.facts:
+        if updated is None or state is None:
             return
-        moment = tracked.moment
-        moment.now = now.mono
-        if claimed(state, moment, self.options) != tracked.facts.claimed:
-            self._mark_dirty(tracked)
-        elif moment.next < tracked.deadline:
-            self._set_deadline(tracked, moment.next)
-
-    def _log_conflict(self, tracked: TrackedVehicle) -> None:
-        """Log once that a conflict has begun."""
-        found, tracked.claims.news = tracked.claims.news, None
-        if found is None:
-            return
-        ways = [str(way) for way in dict.fromkeys(found.ways) if way is not None]
-        places = f": {' and '.join(ways)}" if ways else ""
-        log.warning("two autopilots claim the ids %d.%d%s (%s)", *(tracked.ids or (0, 0)), places, found.why)
-
-    def _mark_dirty(self, tracked: TrackedVehicle) -> None:
-        """Make a `read` due at once, to evaluate this vehicle. Until then its messages settle no facts."""
-        tracked.dirty = True
-        if tracked.state is not None:
-            tracked.state.latest.unsettled = True
-        self.dirty_vehicles.append(tracked)
-        self._set_deadline(tracked, math.inf)
-        self.deadline = -math.inf
-
-    def _look_again(self, until: float) -> TrackedVehicle | None:
-        """Postpone the first deadlines at which the facts do not change, because messages kept arriving.
-
-        Returns the vehicle of the first deadline up to `until` at which the facts change; None if there is none.
-        """
-        while self._due.first <= until:
-            tracked = self._due.first_key()
-            if tracked.state is None:
-                self._set_deadline(tracked, math.inf)
-                continue
-            moment = Moment(tracked.moment.next)
-            if facts_of(tracked.state, moment, self.options) != tracked.facts:
-                return tracked
-            tracked.moment = moment
-            self._set_deadline(tracked, moment.next)
-        return None
-
-    def _set_deadline(self, tracked: TrackedVehicle, at: float) -> None:
-        tracked.deadline = at
-        self._due.set(tracked, at)
-        if at < self.deadline:
-            self.deadline = at
-
-    def _find_deadline(self) -> None:
-        """Set `deadline`."""
-        self.deadline = -math.inf if self.dirty_vehicles else min(self._due.first, self._places.expire_at)
-
-    def _evaluate(self, tracked: TrackedVehicle, now: Instant) -> None:
-        """Update the handle of a vehicle to `now`. Derive a new status only if its facts have changed."""
-        state = tracked.state
-        if state is None:
-            return
+        if before is not state and before is not None:  # another speaker is the vehicle now
+            tracked.requests = tracked.parameters = None
+            tracked.handle.heard_at = state.latest.heartbeat.at if state.latest.heartbeat else None
+            if (before.autopilot, before.vehicle_type) != (state.autopilot, state.vehicle_type):
+                log.warning("vehicle %d.%d: another vehicle has these ids now", *(tracked.ids or (0, 0)))
         if state.boots != tracked.boots:
             self._report_reboot(tracked, state, now)
-        pass_time(state, now, self.options)
-        motion.settle(state.motion, now.mono)
-        motion.settle(state.gps_motion, now.mono)
-        motion.settle(state.rotation, now.mono)
-        tracked.moment = moment = Moment(now.mono)
-        facts = facts_of(state, moment, self.options)
-        state.latest.unsettled = self._short_timeouts
-        if facts != tracked.facts:
+        facts = updated.facts
+        if updated.derived is not None:
             self._log_applet(tracked, facts)
-            self._log_heartbeats(tracked, facts)
+            self._log_heartbeats(tracked, facts, now)
             tracked.facts = facts
-            self._renew(tracked, state, facts, now)
-        tracked.dirty = False
-        tracked.connected = facts.fresh.heartbeat
-        if not tracked.connected:
-            moment.next = math.inf
-        self._set_deadline(tracked, moment.next)
+            self._show(tracked, updated.derived)
+            tracked.handle.evidence = EvidenceOfVehicle(state, facts, updated.derived.reasons)
 
-    def _renew(self, tracked: TrackedVehicle, state: VehicleState, facts: Facts, now: Instant) -> None:
-        """Derive the status in the handle from the facts."""
-        assert tracked.ids is not None
-        handle = tracked.handle
-        derived = derive(facts, tracked.ids, handle.detail, now, self.options)
-        self._log_link(tracked, derived.detail.link)
-        detail = derived.detail
+    def _show(self, tracked: TrackedVehicle, derived: Derived) -> None:
+        """Set the status in the handle."""
+        handle, detail = tracked.handle, derived.detail
+        self._log_link(tracked, detail.link)
         if tracked.name is not None:
             detail = detail._replace(vehicle=detail.vehicle._replace(name=tracked.name))
-        if derived.status != handle.status:
-            handle.status = derived.status
+        if derived.status != handle.status or detail != handle.detail:
+            handle.status, handle.detail = derived.status, detail
             self.changed = True
-        if detail != handle.detail:
-            handle.detail = detail
-            self.changed = True
-        handle.evidence = EvidenceOfVehicle(state, facts, derived.reasons)
 
     def _report_reboot(self, tracked: TrackedVehicle, state: VehicleState, now: Instant) -> None:
         tracked.boots = state.boots
@@ -650,7 +403,7 @@ class MavlinkRobotHW(RobotHW):
         else:
             log.info("vehicle %d.%d: the applet reports the emergency stop", *ids)
 
-    def _log_heartbeats(self, tracked: TrackedVehicle, facts: Facts) -> None:
+    def _log_heartbeats(self, tracked: TrackedVehicle, facts: Facts, now: Instant) -> None:
         """Log once that HIGH_LATENCY2 counts, or that HEARTBEATs do again: then ask again for what is missing."""
         did_not = bool(tracked.facts) and tracked.facts.seldom is not None  # type: ignore[union-attr]
         if did_not is (facts.seldom is not None):
@@ -660,7 +413,7 @@ class MavlinkRobotHW(RobotHW):
             log.info("vehicle %d.%d sends HEARTBEATs", *ids)
             self._asking.next_due = -math.inf
             if tracked.requests is not None:
-                tracked.requests.look_again(tracked.moment.now)
+                tracked.requests.look_again(now.mono)
         else:
             log.info("vehicle %d.%d is heard only through HIGH_LATENCY2: nothing is sent to it", *ids)
 
@@ -673,8 +426,20 @@ class MavlinkRobotHW(RobotHW):
         if state is LinkState.LOST and before is LinkState.CONNECTED:
             tracked.losses += 1
             self._places.lost(tracked, self.options)
-            log.warning("lost vehicle %d.%d: no heartbeat for %g s", *ids, tracked.timeout(self.options))
+            log.warning("lost vehicle %d.%d: nothing for %g s", *ids, tracked.timeout(self.options))
         elif state is LinkState.CONNECTED and before is LinkState.LOST:
             log.info("vehicle %d.%d is back", *ids)
             if tracked.requests is not None:
                 tracked.requests.reconnected(tracked.handle.heard_at or 0.0)
+
+
+def _note_statement(tracked: TrackedVehicle) -> None:
+    """Note when the vehicle was last heard by HIGH_LATENCY2. One that is late does not count."""
+    if tracked.state is not None and tracked.state.high_latency is not None:
+        tracked.handle.heard_at = tracked.state.high_latency.at
+
+
+def _is_armed(tracked: TrackedVehicle) -> bool:
+    """Whether the vehicle is connected, and says that it may move."""
+    main = tracked.belief.main
+    return main is not None and main.armed and tracked.handle.detail.link is LinkState.CONNECTED

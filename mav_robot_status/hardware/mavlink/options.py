@@ -54,7 +54,7 @@ class HardwareOptions:
     """How the messages of a vehicle become a status."""
 
     heartbeat_timeout: Timeout = 3.5
-    """Seconds without a HEARTBEAT after which the link counts as lost."""
+    """Seconds without news after which the link counts as lost, and age from which on a HEARTBEAT is late."""
     sys_status_timeout: Timeout = 5.0
     """Seconds for which a SYS_STATUS is valid."""
     hover_is_motion: bool = True

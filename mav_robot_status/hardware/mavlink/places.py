@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ...interface import DEFAULT_HANDLE_NAME, LinkState
 from .newcomers import Newcomers
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ...interface import IndustrialRobotStatusInterface
+    from .belief import Belief
     from .options import HardwareOptions
-    from .state.claims import Claims
     from .vehicle import Names
 
 log = logging.getLogger(__name__)
@@ -43,7 +43,7 @@ class Places:
         self,
         slots: Sequence[ExpectedVehicle],
         handles: IndustrialRobotStatusInterface,
-        claims: dict[Ids, Claims[Any]],
+        beliefs: dict[Ids, Belief],
         names: Names,
     ) -> None:
         """`slots`: the vehicles of the configuration. Without one, every autopilot gets a place and a handle.
@@ -60,31 +60,31 @@ class Places:
         self.expire_at = math.inf
         """When the first vehicle that was heard only briefly loses its place."""
         self._handles = handles
-        self._claims = claims
+        self._beliefs = beliefs
         self._newcomers = Newcomers()
         self._crowded_until = -math.inf
         """Until when vehicles that were heard only briefly give up their places."""
         for slot in slots:
             handles.register_handle(next(t.handle for t in self.expected if t.slot is slot))
 
-    def place(self, ids: Ids) -> TrackedVehicle | None:
-        """A new vehicle with these ids; None if no entry matches."""
+    def place(self, ids: Ids, belief: Belief | None = None) -> TrackedVehicle | None:
+        """A new vehicle with these ids; None if no entry matches. `belief`: who is known to speak with them."""
         tracked = next((t for t in self.expected if t.matches(*ids)), None)
         if tracked is None and self.is_open and len(self.tracked) < MOST_VEHICLES:
             tracked = TrackedVehicle(ExpectedVehicle(*ids, handle_name(ids)))
             self._handles.register_handle(tracked.handle)
         if tracked is not None:
-            self.give(tracked, ids)
+            self.give(tracked, ids, belief)
         return tracked
 
-    def give(self, tracked: TrackedVehicle, ids: Ids) -> None:
+    def give(self, tracked: TrackedVehicle, ids: Ids, belief: Belief | None = None) -> None:
         """Give these ids to a vehicle in place of those that it had."""
         if tracked.ids is not None:
             del self.tracked[tracked.ids]
-            self._claims.pop(tracked.ids, None)
+            self._beliefs.pop(tracked.ids, None)
         tracked.ids = ids
         tracked.name = self._name(tracked.slot, *ids)
-        tracked.claims = self._claims.setdefault(ids, tracked.claims)
+        tracked.belief = self._beliefs.setdefault(ids, belief or tracked.belief)
         self.tracked[ids] = tracked
 
     def room_for(self, ids: Ids, now: float, options: HardwareOptions) -> list[TrackedVehicle] | None:
@@ -131,7 +131,7 @@ class Places:
         """Free the place of a vehicle. A handle that the configuration names stays, for another vehicle."""
         assert tracked.ids is not None
         del self.tracked[tracked.ids]
-        self._claims.pop(tracked.ids, None)
+        self._beliefs.pop(tracked.ids, None)
         tracked.forget()
         if tracked in self.expected:
             slot, tracked.ids = tracked.slot, None

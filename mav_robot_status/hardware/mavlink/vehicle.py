@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...interface import DEFAULT_HANDLE_NAME, Detail, IndustrialRobotStatusHandle, LinkState, RobotStatus, Vehicle
 from ...values import NamedTuple
-from .moment import Moment
-from .state.claims import Claims
+from .belief import Belief
 from .state.vehicle_state import timeout_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from ...clock import Instant
     from .facts import Facts
     from .options import HardwareOptions
+    from .px4_events import EventTable
     from .requests.lost_events import LostEvents
     from .requests.message_intervals import Requests
     from .requests.parameters import Parameters
@@ -43,24 +44,25 @@ class TrackedVehicle:
     """One vehicle: its handle, and after the first HEARTBEAT its ids and state."""
 
     __slots__ = (
+        "basis",
+        "belief",
         "boots",
-        "claims",
-        "connected",
-        "deadline",
-        "dirty",
+        "conflict_since",
+        "due",
         "established",
+        "event_table",
         "facts",
         "handle",
         "ids",
-        "log_way_at",
         "losses",
         "lost_events",
-        "moment",
         "name",
         "parameters",
         "requests",
         "slot",
-        "state",
+        "tell_late_at",
+        "tell_strangers_at",
+        "touched",
     )
 
     def __init__(self, slot: ExpectedVehicle, name: str | None = None) -> None:
@@ -70,9 +72,10 @@ class TrackedVehicle:
         self.handle = IndustrialRobotStatusHandle(slot.handle)
         self.handle.detail = self.unheard(slot.system, slot.component)
         self.ids: tuple[int, int] | None = None
-        self.state: VehicleState | None = None
-        self.claims: Claims[Any] = Claims()
-        """Who speaks with its ids."""
+        self.belief = Belief()
+        """Who speaks with its ids, each with a state."""
+        self.event_table: EventTable | None = None
+        """The words for its events."""
         self.requests: Requests | None = None
         self.parameters: Parameters | None = None
         self.lost_events: LostEvents | None = None
@@ -81,18 +84,29 @@ class TrackedVehicle:
         """Whether its heartbeats arrived for a while. Otherwise its place is free again soon after it falls silent."""
         self.losses = 0
         """How often the link was lost."""
-        self.log_way_at = -math.inf
-        """When a change of its way may be logged again."""
+        self.tell_strangers_at = self.tell_late_at = -math.inf
+        """When it may be logged again that others speak as it, or that it is late."""
+        self.conflict_since: Instant | None = None
+        """The beginning of the conflict that was logged last."""
         self.facts: Facts | tuple[()] = ()
-        """The facts that the status in the handle is derived from."""
-        self.dirty = False
-        """Whether the next `read` evaluates it."""
-        self.connected = False
-        """Whether the heartbeat was fresh at the last evaluation. Only then does the deadline cover all facts."""
-        self.moment = Moment(-math.inf)
-        """The time of the last evaluation. Its `next` is the deadline: until then only a message changes the facts."""
-        self.deadline = math.inf
-        """The deadline as the hardware interface has noted it."""
+        """The facts of its main speaker."""
+        self.basis: tuple[Any, ...] = ()
+        """What the status in the handle is derived from: conflicts, and the facts of all that claim its ids."""
+        self.due = math.inf
+        """When its status may change, monotonic seconds."""
+        self.touched = False
+        """Whether a message has changed its state since the last `read`."""
+
+    @property
+    def state(self) -> VehicleState | None:
+        """The state of its main speaker; None before the first HEARTBEAT."""
+        main = self.belief.main
+        return None if main is None else main.state
+
+    @property
+    def component(self) -> int:
+        """Its component id."""
+        return 0 if self.ids is None else self.ids[1]
 
     @property
     def costly(self) -> bool:
@@ -116,11 +130,11 @@ class TrackedVehicle:
 
     def forget(self) -> None:
         """Return to the state before the first HEARTBEAT. The ids stay."""
-        self.state, self.facts = None, ()
+        self.facts, self.basis = (), ()
         self.boots = 0
-        self.established = False
-        self.dirty, self.connected, self.moment = False, False, Moment(-math.inf)
-        self.claims.forget()
+        self.established = self.touched = False
+        self.due = math.inf
+        self.belief.forget()
         self.handle.status = RobotStatus()
         self.handle.detail = self.unheard(*(self.ids or (None, None)))
         self.handle.heard_at = None

@@ -111,7 +111,7 @@ def test_in_a_gap_the_lost_link_explains_the_unknown_fields(tmp_path: Path) -> N
     assert found["link"] == {"state": "LOST", "heartbeat_age": 6.0}
     for name, field in found["fields"].items():
         assert field["value"] == ("UNKNOWN" if name == "mode" else None)
-        assert (field["rule"], field["age"]) == ("no heartbeat within heartbeat_timeout", 6.0)
+        assert (field["rule"], field["age"]) == ("no frame within heartbeat_timeout", 6.0)
     (inhibit,) = found["inhibits"]
     assert (inhibit["name"], inhibit["since"]) == ("LINK_STALE", "2027-01-15T08:00:05.500000Z")
 
@@ -252,6 +252,27 @@ def test_the_applet_is_not_mentioned_for_another_autopilot(tmp_path: Path) -> No
     found = explain_log(Config(), applet_log(tmp_path / "a.tlog", (2.0, 0.0), autopilot=12), "+4.5")
     assert "applet" not in found[0]
     assert "applet" not in as_table(found)
+
+
+# -- who speaks --------------------------------------------------------------------------------------------------------
+
+
+def test_two_senders_of_one_vehicle_are_listed_and_one_is_not(tmp_path: Path) -> None:
+    with open(tmp_path / "two.tlog", "wb") as log:
+        for tick in range(12):
+            for late, sequence, base_mode in ((0, tick, DISARMED), (0.2, tick + 100, ARMED)):
+                log.write(round(START_US + (tick / 2 + late) * 1e6).to_bytes(8, "big"))
+                log.write(encode(Heartbeat(0, 10, 3, base_mode, 4, 3), system=1, component=1, sequence=sequence))
+    found = explained(str(tmp_path / "two.tlog"))
+    assert [(one["address"], one["proof"], one["armed"]) for one in found["senders"]] == [
+        ("the log", "first heard", False),
+        ("the log", "not proven", True),
+    ]
+    assert [line for line in as_table([found]) if line.startswith("sender ")][1] == (
+        "sender   the log: GROUND_ROVER, armed, 1 count of sequence numbers, not proven, claims the ids for 4.0 s"
+    )
+    assert json.loads(as_json([found])[0])["senders"] == found["senders"]
+    assert "senders" not in explained(log_of(tmp_path / "one.tlog", 0, 1, 2))
 
 
 # -- live --------------------------------------------------------------------------------------------------------------

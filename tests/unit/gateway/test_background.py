@@ -92,7 +92,7 @@ def test_leaving_the_context_stops_the_gateway() -> None:
 
 
 def test_the_error_that_ends_the_gateway_is_raised(monkeypatch: pytest.MonkeyPatch, vehicle: socket.socket) -> None:
-    def fail(frame: object, now: object, way: object = None) -> None:
+    def fail(*_: object) -> None:
         raise LinkError("the device has gone")
 
     watched = BackgroundGateway(HERE)

@@ -20,7 +20,7 @@ from mav_robot_status.gateway.controller_config import DEFAULT_CONTROLLER
 from mav_robot_status.gateway.event_loop import EventLoop
 from mav_robot_status.gateway.pace import BURST, MOST_AT_ONCE, RATE
 from mav_robot_status.links.udp import UdpLink
-from mav_robot_status.mavlink.definitions import Heartbeat
+from mav_robot_status.mavlink.definitions import Heartbeat, SystemTime
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.framing import Frame, Parser
 from mav_robot_status.testing import ManualClock
@@ -235,11 +235,13 @@ def test_requests_follow_a_vehicle_to_its_new_address(stdout: TextIO, vehicle: s
     with closing(live), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as new:
         new.bind(("127.0.0.1", 0))
         start = Instant(50.0, 0)
-        for sender, late in ((vehicle, 0.0), (new, 2.0)):
-            sender.sendto(autopilot(), address(live))
-            receive(live, later(start, late))
-            live.turn(later(start, late))
-        live.turn(later(start, 3.01))
+        for number in range(8):
+            clock = SystemTime(0, 60_000 + 500 * number)
+            sender, now = vehicle if number < 3 else new, later(start, number / 2)
+            sender.sendto(autopilot(sequence=2 * number), address(live))
+            sender.sendto(encode(clock, system=1, component=1, sequence=2 * number + 1), address(live))
+            receive(live, now)
+            live.turn(now)
         assert [f for f in heard(new) if f.message_id == 76]
         assert not [f for f in heard(vehicle) if f.message_id == 76]
 

@@ -7,12 +7,15 @@ from typing import Any, TextIO
 
 import pytest
 
-from mav_robot_status.config import Config, VehicleConfig
+from mav_robot_status.config import Config, LinkConfig, VehicleConfig
 from mav_robot_status.errors import UsageError
 from mav_robot_status.gateway.recorded_log import Recording
 from mav_robot_status.gateway.replay import ReplayPipeline, replay, run_through
-from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
+from mav_robot_status.hardware.mavlink import update
+from mav_robot_status.hardware.mavlink.derive import derive
+from mav_robot_status.hardware.mavlink.interface import SETTLES
 from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+from mav_robot_status.hardware.mavlink.settle import facts_of
 from mav_robot_status.links.log import Stamped
 from mav_robot_status.mavlink.definitions import Attitude, GlobalPositionInt, Heartbeat, NamedValueInt, VfrHud
 from mav_robot_status.mavlink.encode import encode
@@ -116,13 +119,22 @@ def test_an_expected_vehicle_has_lines_from_the_start_even_if_it_never_appears(t
     assert len(lines) == pytest.approx(20, abs=2)
 
 
+def test_the_vehicles_of_a_log_have_the_time_out_of_the_first_link(tmp_path: Path, stdout: TextIO) -> None:
+    config = Config(links=(LinkConfig("udp:127.0.0.1:14550", heartbeat_timeout=20.0),))
+    replay(config, log_of(tmp_path / "a.tlog", 0, 1, 15, 16), stdout)
+    stdout.seek(0)
+    assert {json.loads(line)["link"]["state"] for line in stdout} == {"CONNECTED"}
+
+
 def test_a_missing_log_is_a_user_error(tmp_path: Path, stdout: TextIO) -> None:
     with pytest.raises(UsageError, match="cannot read the log"):
         replay(Config(), str(tmp_path / "missing.tlog"), stdout)
 
 
-def test_a_steady_stream_settles_no_facts(tmp_path: Path, stdout: TextIO, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "steady.tlog"
+def test_a_steady_stream_is_settled_twenty_times_a_second_and_derives_nothing(
+    tmp_path: Path, stdout: TextIO, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, sequence = tmp_path / "steady.tlog", 0
     with path.open("wb") as log:
         for number in range(200):
             boot_ms = 60_000 + number * 50
@@ -132,16 +144,21 @@ def test_a_steady_stream_settles_no_facts(tmp_path: Path, stdout: TextIO, monkey
                 messages.append(Heartbeat(0, 10, 3, 193, 4, 3))
             for message in messages:
                 log.write((START_US + number * 50_000).to_bytes(8, "big"))
-                log.write(encode(message, system=1, component=1, sequence=0))
-    settled: list[float] = []
-    settle = MavlinkRobotHW._settle
+                log.write(encode(message, system=1, component=1, sequence=sequence & 255))
+                sequence += 1
+    settled, derived = [], []
 
-    def counting(self: MavlinkRobotHW, *values: Any) -> None:
-        settled.append(values[-1].mono)
-        settle(self, *values)
+    def settling(state: Any, moment: Any, options: Any) -> Any:
+        settled.append(moment.now)
+        return facts_of(state, moment, options)
 
-    monkeypatch.setattr(MavlinkRobotHW, "_settle", counting)
+    def deriving(*values: Any) -> Any:
+        derived.append(values[3].mono)
+        return derive(*values)
+
+    monkeypatch.setattr(update, "facts_of", settling)
+    monkeypatch.setattr(update, "derive", deriving)
     run_through(pipeline_of(stdout), Recording(str(path)))
-    late = [at for at in settled if at > 2.0]
-    assert settled
-    assert len(late) <= 10, "only the heartbeats, of 480 messages"
+    assert derived
+    assert [at for at in derived if at > 2.0] == []
+    assert len([at for at in settled if at > 2.0]) <= 8.0 / SETTLES + 8, "and after each of the heartbeats"

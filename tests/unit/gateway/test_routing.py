@@ -473,5 +473,5 @@ def test_any_bytes_are_accepted_and_no_bytes_are_added(pieces: list[tuple[End, b
             rest = iter(raws)
             assert all(part in rest for part in sent)
         else:
-            assert b"".join(raws) == data
+            assert b"".join(raws).endswith(data)  # before it may come what was incomplete
         assert not any(end in to or PASSIVE in to for _, to in plan)

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_robot_status.hardware.group import GROUP, RULES, Combined, Group, Logic, Member, Rule, combine, last_heard
+from mav_robot_status.hardware.group import GROUP, RULES, Combined, Group, Member, Rule, combine, last_heard
+from mav_robot_status.hardware.join import Logic
 from mav_robot_status.interface import (
     Detail,
     ErrorCause,
@@ -45,8 +46,8 @@ def with_field(field: str, value: Any) -> RobotStatus:
 
 def oracle(field: str, values: tuple[TriState, ...]) -> TriState:
     """The table of rules in words, for the tri-states."""
-    if field == "motion_possible":
-        return FALSE if FALSE in values else TRUE if set(values) == {TRUE} else UNKNOWN
+    if field == "e_stopped":
+        return values[0] if len(set(values)) == 1 else UNKNOWN
     return TRUE if TRUE in values else FALSE if set(values) == {FALSE} else UNKNOWN
 
 
@@ -93,13 +94,13 @@ def test_a_group_without_members_knows_nothing() -> None:
     assert found.detail.link is LinkState.NEVER_SEEN
 
 
-def test_a_lost_member_leaves_the_group_what_the_others_prove() -> None:
+def test_a_stopped_member_proves_nothing_of_a_lost_one() -> None:
     lost = Detail(inhibits=(Inhibit("LINK_STALE", None, 5),), link=LinkState.LOST)
     stopped = RobotStatus(e_stopped=TRUE, drives_powered=FALSE, motion_possible=FALSE)
     why = Detail(inhibits=(Inhibit("E_STOPPED", "the red button", 7),))
     base, arm = member("base", RobotStatus(), lost), member("arm", stopped, why)
     status, detail, _ = combine(ROBOT, [base, arm], Detail(), NOW)
-    assert status == RobotStatus(e_stopped=TRUE, motion_possible=FALSE)
+    assert status == RobotStatus()
     assert detail.link is LinkState.CONNECTED
     assert [(i.handle, i.name, i.text, i.since_us) for i in detail.inhibits] == [
         ("base", "LINK_STALE", None, 5),
@@ -145,8 +146,9 @@ def test_a_member_that_gives_no_reason_gets_one_that_keeps_its_time() -> None:
 
 def test_the_evidence_names_the_member_that_decided() -> None:
     stopped = RobotStatus(e_stopped=TRUE)
-    found = of(RobotStatus(), stopped, stopped)
-    assert found.evidence["e_stopped"] == Evidence("b, and 1 more: the word of b", "its message", 0.5)
+    assert of(stopped, stopped).evidence["e_stopped"] == Evidence("a, and 1 more: the word of a", "its message", 0.5)
+    found = of(stopped, RobotStatus(), stopped)
+    assert found.evidence["e_stopped"] == Evidence("b: the word of b", "its message", 0.5)
     assert found.evidence["in_motion"] == Evidence("a, and 2 more", None, 1.0)
 
 

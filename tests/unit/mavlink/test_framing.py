@@ -78,22 +78,24 @@ def pymavlink_frames(data: bytes, dialect: Any = ardupilotmega) -> list[tuple[An
 
 
 def test_a_frame_is_cut_into_its_parts() -> None:
-    (frame,), counters = feed(heartbeat(sequence=7, system=3, component=100))
-    assert frame == Frame(0, (3, 100), 7, HEARTBEAT, b"")
+    data = heartbeat(sequence=7, system=3, component=100)
+    (frame,), counters = feed(data)
+    assert frame == Frame(0, (3, 100), 7, HEARTBEAT, data)
     assert counters == Counters(frames=1)
 
 
 def test_mavlink_1_is_understood_and_counted() -> None:
-    (frame,), counters = feed(heartbeat(sequence=7, system=3, component=100, version=1))
-    assert frame == Frame(0, (3, 100), 7, HEARTBEAT, b"")
+    data = heartbeat(sequence=7, system=3, component=100, version=1)
+    (frame,), counters = feed(data)
+    assert frame == Frame(0, (3, 100), 7, HEARTBEAT, data)
     assert counters == Counters(frames=1, frames_v1=1)
 
 
-def test_only_wanted_frames_are_returned_but_all_known_ones_are_counted() -> None:
+def test_all_frames_are_returned_and_only_wanted_ones_are_decoded() -> None:
     parser = Parser({0})
     encoder = Encoder(1, 1)
     frames = parser.feed(encoder.frame(ATTITUDE) + encoder.frame(HEARTBEAT) + encoder.frame(ATTITUDE))
-    assert [f.message_id for f in frames] == [0]
+    assert [(f.message_id, f.sequence, f.message) for f in frames] == [(30, 0, None), (0, 1, HEARTBEAT), (30, 2, None)]
     assert parser.counters == Counters(frames=3)
 
 
@@ -239,7 +241,7 @@ def test_frames_of_another_definition_count_once_each_even_if_they_look_full_of_
 def test_unknown_ids_are_skipped_whole_and_counted() -> None:
     hidden = heartbeat(9)
     frames, counters = feed(unknown_frame(hidden, 0) + heartbeat(1), unknown_frame(b"end of the data", 2))
-    assert [f.sequence for f in frames] == [1]
+    assert [(f.sequence, f.message is None) for f in frames] == [(0, True), (1, False), (2, True)]
     assert counters == Counters(frames=1, unknown={UNKNOWN_ID: 2})
 
 
@@ -256,11 +258,12 @@ def test_signed_frames_have_their_signature_block() -> None:
     mav.signing.link_id = 3
     mav.signing.timestamp = 1234567890
     packed = mav.heartbeat_encode(2, 3, 209, 4, 4).pack(mav)
-    (frame, following), counters = feed(packed + heartbeat())
+    unsigned = heartbeat()
+    (frame, following), counters = feed(packed + unsigned)
     assert frame.raw == packed
     assert frame.raw[-13] == 3
     assert frame.message == following.message
-    assert following.raw == b""
+    assert following.raw == unsigned
     assert counters == Counters(frames=2, signed=1)
 
 

@@ -22,9 +22,9 @@ def test_the_crc_before_its_last_byte_is_pymavlinks() -> None:
 def test_the_keys_of_known_ids_are_their_bytes_in_a_frame_and_only_wanted_ones_are_read() -> None:
     known = known_ids(frozenset({0, 900_000}))
     for message_id, crc_extra in CRC_EXTRA.items():
-        effect, reads = known[V2][message_id.to_bytes(3, "little")]
-        assert effect == REVERSED[crc_extra] << 8
-        assert (reads is not None) is (message_id == 0)
+        effect, known_id, reader = known[V2][message_id.to_bytes(3, "little")]
+        assert (effect, known_id) == (REVERSED[crc_extra] << 8, message_id)
+        assert (reader is not None) is (message_id == 0)
         if message_id < 256:
             assert known[V1][message_id] is known[V2][message_id.to_bytes(3, "little")]
     strange = set(range(256)) - CRC_EXTRA.keys()

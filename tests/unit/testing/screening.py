@@ -57,7 +57,10 @@ class Screening:
 
     def receive(self, message: MAVLink_message, sender: tuple[int, int] = (1, 1)) -> str:
         """Receive one more message, from the vehicle or from another sender. Return the status."""
-        self._receive(message.pack(MAVLink(None, srcSystem=sender[0], srcComponent=sender[1])))
+        mav = MAVLink(None, srcSystem=sender[0], srcComponent=sender[1])
+        if sender == (1, 1):  # the message takes part in the count of the vehicle
+            mav.seq, self._model._seq = self._model._seq, (self._model._seq + 1) % 256
+        self._receive(message.pack(mav))
         self._read()
         return line(self.status)
 

@@ -56,6 +56,8 @@ def table(rows: Iterable[Row]) -> tuple[TextRule, ...]:
     return tuple(TextRule(*row) for row in rows)
 
 
+ARMING: Final = re.compile(r"Arming motors|Throttle armed|Armed by ")
+"""Texts with which ArduPilot and PX4 announce that they are armed, before their next HEARTBEAT."""
 UNCLASSIFIED: Final = MAV_SEVERITY_CRITICAL
 """While armed, a text without a row is an error at this severity or a more urgent one."""
 

@@ -16,7 +16,7 @@ from .statustext import pass_time
 if TYPE_CHECKING:
     from ..options import HardwareOptions
 
-__all__ = ["HANDLERS", "hear", "overheard", "pass_time", "transmitter_heard"]
+__all__ = ["HANDLERS", "HANDLERS_BY_ID", "hear", "overheard", "pass_time", "transmitter_heard"]
 
 Handler = Callable[[VehicleState, Any, Instant, "HardwareOptions"], "bool | None"]
 """It returns True if no fact has changed, unless `LatestMessages.unsettled` is set: of what facts are made of, it has
@@ -36,7 +36,6 @@ HANDLERS: Final[dict[type, Handler]] = {
     mav.GpsRawInt: kinematics.gps_raw_int,
     mav.Attitude: kinematics.attitude,
     mav.EkfStatusReport: kinematics.ekf_status_report,
-    mav.SystemTime: kinematics.system_time,
     mav.ServoOutputRaw: outputs.servo_output_raw,
     mav.ParamValue: outputs.param_value,
     mav.RcChannels: outputs.rc_channels,
@@ -55,6 +54,10 @@ HANDLERS: Final[dict[type, Handler]] = {
     mav.AutopilotVersion: modes.autopilot_version,
     mav.MessageInterval: modes.message_interval,
 }
+
+
+HANDLERS_BY_ID: Final = {d.id: HANDLERS[d.type] for d in mav.MESSAGES.values() if d.type in HANDLERS}
+"""The same by message id."""
 
 
 def hear(state: VehicleState, message: Any, now: Instant, options: HardwareOptions) -> None:

@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING
 
 from ....interface.status import TriState
 from ....mavlink.definitions import CommandAck, CommandInt, CommandLong
-from ....mavlink.enumerations import MAV_CMD_DO_FLIGHTTERMINATION, MAV_RESULT_ACCEPTED
+from ....mavlink.enumerations import (
+    MAV_CMD_COMPONENT_ARM_DISARM,
+    MAV_CMD_DO_FLIGHTTERMINATION,
+    MAV_RESULT_ACCEPTED,
+)
 from ..causes import TERMINATION_ANNOUNCED
 from ..state import estop, latches, pending_command
 from ..state.vehicle_state import honours_stop
@@ -34,9 +38,11 @@ def overheard(state: VehicleState, message: CommandLong | CommandInt, sender: tu
 
 def command_ack(state: VehicleState, message: CommandAck, now: Instant, options: HardwareOptions) -> None:
     """COMMAND_ACK: apply the command if the vehicle accepted it."""
-    if not state.asked:
-        return
     asked, state.asked = pending_command.answered(state.asked, message, now)
+    if message.command == MAV_CMD_COMPONENT_ARM_DISARM:
+        if message.result == MAV_RESULT_ACCEPTED and (asked is None or asked.param1 != 0):
+            state.told_armed = max(state.told_armed, now.mono)
+        return
     if asked is None:
         return
     if message.result != MAV_RESULT_ACCEPTED:

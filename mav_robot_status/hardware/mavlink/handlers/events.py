@@ -50,8 +50,7 @@ def response_event_error(
 
 def _is_ahead(state: VehicleState, message: Event, now: Instant) -> bool:
     """Whether the time of an event is ahead of the autopilot's clock: then the event is from the run before."""
-    boot = state.boot
-    return boot.clock_ms is not None and message.event_time_boot_ms > (now.mono - boot.at) * 1000 + BACK_MS
+    return state.has_clock and message.event_time_boot_ms > (now.mono - state.booted) * 1000 + BACK_MS
 
 
 def _follow(state: VehicleState, known: event_sequence.EventSequence) -> None:

@@ -14,14 +14,12 @@ from ....mavlink.enumerations import (
 )
 from .. import causes
 from ..autopilots.profile import EmergencyStop, Uninit
-from ..state import applet as applet_rules
 from ..state import arming_report, estop, event_sequence, latches, outputs, readiness, sensors
-from ..state import boot_clock as boot_rules
 from ..state.heartbeat_history import armed_before, next_heartbeat
 from ..state.high_latency import is_statement
 from ..state.latest_messages import LatestMessages, heard
 from ..state.motion import Motion
-from ..state.vehicle_state import VehicleState, begin, honours_stop, timeout_of
+from ..state.vehicle_state import VehicleState, begin, timeout_of
 from .outputs import look_again
 from .statustext import pass_time
 
@@ -29,14 +27,14 @@ if TYPE_CHECKING:
     from ....clock import Instant
     from ..options import HardwareOptions
 
+SUDDEN: Final = 0.3
+"""Seconds after an armed HEARTBEAT within which a disarmed one is not believed alone: the interval is 1 s."""
 LONG_LOSS: Final = 30.0
 """Seconds of link loss after which all latched state is invalid."""
 LONGEST_START: Final = 10.0
 """Seconds from the first heartbeat to the text that ends the start."""
 TICKS: Final = 1.5
 """Seconds within which a clock counts as running."""
-BACK: Final = 10.0
-"""Seconds after the link returns within which the clock shows whether this is the same vehicle."""
 
 
 def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: HardwareOptions) -> None:
@@ -61,12 +59,12 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
     seen.heartbeat = heard(seen, message, now.mono, seen.heartbeat)
     if message != previous:
         seen.unsettled = True
-        if _starts_anew(previous, message, state):
-            rebooted(state, boot_rules.BootClock(now.mono), now)
+        if starts_anew(previous, message, state):
+            rebooted(state, now.mono, now)
     if state.started_at is not None:
         started, state.started_at = state.started_at, None
         if _is_another_run(state, started):
-            rebooted(state, boot_rules.BootClock(started), now)
+            rebooted(state, started, now)
     if now.mono - last > LONG_LOSS:
         state.latches = latches.NO_LATCHES
         state.failsafe_cleared = None
@@ -76,6 +74,8 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         state.motion, state.gps_motion, state.rotation = Motion(), Motion(), Motion()
         state.stop = estop.unsure(state.stop, estop.LINK_LOST, now.mono)
         state.arming = arming_report.NOTHING  # a newer one may be lost
+    if before.armed and not heartbeats.armed and now.mono - last < SUDDEN:
+        state.told_armed = now.mono + 1e-6
     if heartbeats.armed and not (before.armed and connected):
         state.armed_after = seen.sys_status.message if seen.sys_status is not None else None
     if not connected or (before.armed and not heartbeats.armed):
@@ -92,26 +92,9 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         seen.unsettled = True
 
 
-def changed_way(state: VehicleState, now: float) -> None:
-    """Another way of the vehicle counts now, and nothing shows that it is the same vehicle.
-
-    What was said or shown of a stop may be that of another one: a doubt remains.
-    """
-    word, status = state.applet, state.latest.sys_status
-    if word is not None:
-        state.applet = None
-        if applet_rules.stops(word, honours_stop(state)):
-            state.stop = estop.doubted(state.stop, estop.ANOTHER_WAY, now)
-    if status is not None and sensors.safety_switch_on(status.message):
-        state.latest.sys_status = None
-    state.stop = estop.unsure(state.stop, estop.ANOTHER_WAY, now)
-    state.asked = ()
-    state.latches = latches.clear(state.latches, (causes.TERMINATION_ANNOUNCED,))
-
-
 def _another(state: VehicleState, message: Heartbeat, now: Instant) -> None:
     """Another autopilot: the state of the old one is invalid."""
-    new = begin(message, now, state.claims)
+    new = begin(message, now)
     new.boots = state.boots
     state.become(new)
 
@@ -122,7 +105,7 @@ def _sent_none(state: VehicleState) -> bool:
     return beat is not None and is_statement(beat.message)
 
 
-def _starts_anew(previous: Heartbeat, message: Heartbeat, state: VehicleState) -> bool:
+def starts_anew(previous: Heartbeat, message: Heartbeat, state: VehicleState) -> bool:
     """The heartbeat reports that the autopilot is starting, and the one before reported that it was running."""
     now_in, was_in = message.system_status, previous.system_status
     if now_in == MAV_STATE_BOOT and was_in >= MAV_STATE_STANDBY:
@@ -141,63 +124,43 @@ def _is_another_run(state: VehicleState, started: float) -> bool:
     seen = state.latest
     clocks = (seen.attitude, seen.global_position, seen.local_position)
     ticks = any(clock is not None and started - clock.at < TICKS for clock in clocks)
-    return not ticks and started - state.boot.at > LONGEST_START
+    return not ticks and started - state.booted > LONGEST_START
 
 
-def clock_changed(state: VehicleState, now: Instant) -> None:
-    """The clock gives another boot time: a reboot, two clocks, or a correction, which matters only for faults."""
-    boot = state.boot
-    if boot.in_turn:
-        state.claims.contradict("time_boot_ms of two clocks in turn", state.claims.way, now)
-        state.latest.unsettled = True
-    if boot.rebooted:
-        rebooted(state, boot, now)
-    elif boot.ahead and _is_back(state, now.mono):
-        _exchanged(state, now)
-    elif state.faults:
-        state.latest.unsettled = True
-
-
-def _is_back(state: VehicleState, now: float) -> bool:
-    """Whether the link was lost, and came back not long ago."""
-    since = state.heartbeats.since.mono
-    return now - since <= BACK and state.heartbeats.runs[0].first < since
-
-
-def _exchanged(state: VehicleState, now: Instant) -> None:
-    """After a loss of the link the clock is far ahead: another vehicle, which has run for longer, has these ids now."""
+def exchanged(state: VehicleState, booted: float, now: Instant) -> None:
+    """The clock is ahead of every one before: another vehicle has these ids now."""
     beat = state.latest.heartbeat
     assert beat is not None  # a state begins with a heartbeat
-    new = begin(beat.message, now, state.claims)
-    new.boot, new.boots, new.heartbeats = state.boot, state.boots + 1, state.heartbeats
-    new.latest.heartbeat = beat
+    new = begin(beat.message, now)
+    new.booted, new.has_clock, new.boots, new.heartbeats = booted, True, state.boots + 1, state.heartbeats
+    new.latest.heartbeat, new.told_armed = beat, now.mono
     state.become(new)
 
 
-def rebooted(state: VehicleState, boot: boot_rules.BootClock, now: Instant) -> None:
+def rebooted(state: VehicleState, booted: float, now: Instant, *, by_clock: bool = False) -> None:
     """After a reboot the state of the old run is invalid. A reboot while armed is an error."""
     seen = state.latest
-    status = seen.sys_status if seen.sys_status is not None and seen.sys_status.at > boot.at else None
-    counts_anew = state.events.since > boot.at
+    status = seen.sys_status if seen.sys_status is not None and seen.sys_status.at > booted else None
+    counts_anew = state.events.since > booted
     new = VehicleState(
         latest=LatestMessages(heartbeat=seen.heartbeat, sys_status=status),
         heartbeats=state.heartbeats,
-        boot=boot,
+        booted=booted,
+        has_clock=by_clock,
         vehicle_type=state.vehicle_type,
         autopilot=state.autopilot,
         shown=state.shown,
         watch=outputs.Watch(functions=state.watch.functions),
         switches=state.switches,
         modes=state.modes,
-        firmware=state.firmware if state.firmware is not None and state.firmware.at > boot.at else None,
+        firmware=state.firmware if state.firmware is not None and state.firmware.at > booted else None,
         asked=state.asked,
         events=state.events if counts_anew else event_sequence.NOTHING,
         arming=state.arming if counts_anew else arming_report.NOTHING,
         boots=state.boots + 1,
-        claims=state.claims,
     )
-    armed = causes.REBOOT_WHILE_ARMED in state.latches or armed_before(state.heartbeats, boot.at, LONG_LOSS)
-    if armed and not boot.in_turn:
+    armed = causes.REBOOT_WHILE_ARMED in state.latches or armed_before(state.heartbeats, booted, LONG_LOSS)
+    if armed:
         new.latches = latches.announce(new.latches, causes.REBOOT_WHILE_ARMED, None, now, "time_boot_ms")
     state.become(new)
 

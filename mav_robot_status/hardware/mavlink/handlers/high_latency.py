@@ -34,7 +34,7 @@ def high_latency(state: VehicleState, message: HighLatency2, now: Instant, optio
     """A HIGH_LATENCY2 of a vehicle that sends no HEARTBEAT. What HEARTBEATs said is kept until they come again."""
     if (message.autopilot, message.type) != (state.autopilot, state.vehicle_type):
         boots = state.boots
-        state.become(begin(rules.stated(message), now, state.claims))
+        state.become(begin(rules.stated(message), now))
         state.boots = boots
     pass_time(state, now, options)
     before = state.high_latency

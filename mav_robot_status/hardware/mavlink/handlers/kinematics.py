@@ -10,13 +10,11 @@ from ....mavlink.enumerations import EKF_ATTITUDE, EKF_CONST_POS_MODE, GPS_FIX_T
 from ..autopilots.profile import HudSpeed, ZeroSpeed
 from ..identity import AIRCRAFT, ROVER
 from ..state import motion, sensors
-from ..state.boot_clock import heard_clock
 from ..state.estimator import FRESH as ESTIMATOR_FRESH
 from ..state.estimator import denied_until
 from ..state.latest_messages import FRESH, Heard, heard, is_fresh
 from ..state.lift import IDLE, LEAST_LIFT, heard_throttle
 from ..state.vehicle_state import is_multicopter
-from .heartbeat import clock_changed
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -41,32 +39,26 @@ def global_position(
 ) -> bool:
     """GLOBAL_POSITION_INT: the first choice for speed."""
     at = now.mono
-    corrected = heard_clock(state.boot, message.time_boot_ms, at)
-    if corrected:
-        clock_changed(state, now)
     seen = state.latest
     seen.global_position = heard(seen, message, at, seen.global_position)
     vx, vy, vz = message.vx, message.vy, message.vz
     still = not (vx or vy or (vz and state.family is not ROVER))
     nowhere = message.lat == 0 and message.lon == 0
     speed = _speed(state, vx / 100, vy / 100, vz / 100, still, nowhere, at, options)
-    return _moved(state, state.motion, speed, at, options) and not corrected and _speed_counts_alike(state)
+    return _moved(state, state.motion, speed, at, options) and _speed_counts_alike(state)
 
 
 def local_position(state: VehicleState, message: mav.LocalPositionNed, now: Instant, options: HardwareOptions) -> bool:
     """LOCAL_POSITION_NED: the speed while no global position is fresh."""
     at = now.mono
-    corrected = heard_clock(state.boot, message.time_boot_ms, at)
-    if corrected:
-        clock_changed(state, now)
     seen = state.latest
     seen.local_position = heard(seen, message, at, seen.local_position)
     if is_fresh(seen.global_position, at, FRESH):
-        return not corrected
+        return True
     vx, vy, vz = message.vx, message.vy, message.vz
     still = not (vx or vy or (vz and state.family is not ROVER))
     speed = _speed(state, vx, vy, vz, still, False, at, options)
-    return _moved(state, state.motion, speed, at, options) and not corrected and _speed_counts_alike(state)
+    return _moved(state, state.motion, speed, at, options) and _speed_counts_alike(state)
 
 
 def vfr_hud(state: VehicleState, message: mav.VfrHud, now: Instant, options: HardwareOptions) -> bool:
@@ -107,9 +99,6 @@ def gps_raw_int(state: VehicleState, message: mav.GpsRawInt, now: Instant, optio
 def attitude(state: VehicleState, message: mav.Attitude, now: Instant, options: HardwareOptions) -> bool:
     """ATTITUDE: rotation."""
     at = now.mono
-    corrected = heard_clock(state.boot, message.time_boot_ms, at)
-    if corrected:
-        clock_changed(state, now)
     seen = state.latest
     seen.attitude = heard(seen, message, at, seen.attitude)
     if state.vehicle_type == MAV_TYPE_SURFACE_BOAT:  # they always roll
@@ -117,7 +106,7 @@ def attitude(state: VehicleState, message: mav.Attitude, now: Instant, options: 
     else:
         turning = fastest(message.yawspeed, message.rollspeed, message.pitchspeed)
     state.turning = turning
-    unchanged = not corrected and state.watch.held_since is None
+    unchanged = state.watch.held_since is None
     rotation = state.rotation
     if turning < motion.RATE_OFF and rotation.slow_since is not None:
         return unchanged  # while it is at rest, nothing changes
@@ -132,14 +121,6 @@ def ekf_status_report(
     state.unaided, state.unaided_at = bool(flags & EKF_CONST_POS_MODE), now.mono
     state.tilted = bool(flags) and not flags & EKF_ATTITUDE  # no flags: another estimator is in use
     return not (was_tilted or state.tilted)
-
-
-def system_time(state: VehicleState, message: mav.SystemTime, now: Instant, options: HardwareOptions) -> bool:
-    """SYSTEM_TIME: the autopilot's clock."""
-    if not heard_clock(state.boot, message.time_boot_ms, now.mono):
-        return True
-    clock_changed(state, now)
-    return False
 
 
 def _speed(

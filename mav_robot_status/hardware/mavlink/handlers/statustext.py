@@ -53,6 +53,8 @@ def statustext_(state: VehicleState, message: Statustext, now: Instant, options:
 def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
     """A complete text, or the part that arrived."""
     words = text.text
+    if text_rules.ARMING.match(words):
+        state.told_armed = max(state.told_armed, now.mono)
     if words in state.profile.requests.boot_texts:
         state.started_at = now.mono
     version = firmware.of_text(words, state.profile.texts.firmware, state.family)

@@ -25,7 +25,7 @@ def is_wanted(tracked: TrackedVehicle, now: float) -> bool:
     state, facts = tracked.state, tracked.facts
     if state is None or not facts or not state.profile.requests.prearm_checks:
         return False
-    if state.heartbeats.armed or facts.armed or facts.claimed.doubted:
+    if state.heartbeats.armed or tracked.handle.status.drives_powered is not TriState.FALSE:
         return False
     if state.profile.texts.sends_events:
         return not state.arming.chunks and now >= state.heartbeats.since.mono + LISTEN

@@ -21,6 +21,8 @@ def drives_powered(facts: Facts, options: HardwareOptions, stopped: TriState, wh
     if not facts.armed:
         if hides_armed(facts):
             return UNKNOWN, Reason("a state in which the autopilot does not say whether it is armed", Source.STATE)
+        if facts.fresh.arming_told and stopped is not TRUE:
+            return UNKNOWN, Reason("an arming was announced, and no HEARTBEAT has arrived since", Source.BASE_MODE)
         return FALSE, Reason("disarmed", Source.BASE_MODE)
     if actuators_blocked(facts, options):
         return FALSE, Reason("hardware in the loop: actuators blocked", Source.BASE_MODE)
@@ -40,7 +42,7 @@ def motion_possible(
     state = facts.heartbeat.system_status
     if drives is FALSE:
         return FALSE, why_drives._replace(rule=f"drives_powered is false: {why_drives.rule}")
-    if hides_armed(facts):
+    if hides_armed(facts) or (drives is UNKNOWN and not facts.armed):
         return UNKNOWN, why_drives
     if state in NOT_MOVING_STATES:
         return FALSE, Reason("a state in which the vehicle does not move", Source.STATE)

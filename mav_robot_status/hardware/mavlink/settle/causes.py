@@ -25,7 +25,6 @@ from ..state import (
     readiness,
     sensors,
 )
-from ..state.boot_clock import GRACE
 from ..state.latest_messages import FRESH
 
 if TYPE_CHECKING:
@@ -68,7 +67,7 @@ def sys_status(state: VehicleState, moment: Moment, options: HardwareOptions) ->
 
 def faults(state: VehicleState, moment: Moment, options: HardwareOptions) -> tuple[SensorFault, ...]:
     """The bits that have been faulty for long enough, some time after the boot."""
-    if not state.faults or not moment.has_come(state.boot.at + GRACE):
+    if not state.faults or not moment.has_come(state.booted + sensors.GRACE):
         return ()
     return tuple(
         SensorFault(bit, weight is SOFT, fault.since.unix_us)
@@ -116,7 +115,7 @@ def reported_by_parts(state: VehicleState, moment: Moment, options: HardwareOpti
     lasting = [(key[1], f) for key, f in state.faulty_parts.items() if moment.is_within(f.last + parts.SILENCE)]
     refusals = tuple(NotReady(fault.text, fault.since.unix_us) for code, fault in lasting if code == parts.NOT_READY)
     counting = [(code, f) for code, f in lasting if code != parts.NOT_READY and f.reports >= parts.DEBOUNCE]
-    if not counting or not moment.has_come(state.boot.at + GRACE):
+    if not counting or not moment.has_come(state.booted + sensors.GRACE):
         return Parts((), refusals)
     return Parts(tuple(_joined(code, counting) for code in sorted({code for code, _ in counting})), refusals)
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from ..state.motion import Motion
     from ..state.vehicle_state import VehicleState
 
+SAMPLED: Final = 2.0
+"""Seconds for which a sample shows rest. It does not show how a vehicle moves after it."""
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 new: Final = tuple.__new__  # as in `framing`
 
@@ -43,6 +45,8 @@ def movement(state: VehicleState, moment: Moment, options: HardwareOptions) -> M
     """The motion according to speed and rotation."""
     motion = state.motion
     value = settled(motion, moment)
+    if value is FALSE and not moment.is_within(motion.at + SAMPLED):
+        value = UNKNOWN
     moves_disarmed = (
         value is TRUE and not state.heartbeats.armed and speed_over_ground(state.latest) > options.v_on_disarmed
     )

@@ -66,6 +66,9 @@ def stop(state: VehicleState, moment: Moment, options: HardwareOptions) -> Stop:
     elif said is estop.NOTHING:
         return NOTHING_SAID
     is_over = said.repeats and moment.has_come(said.last + estop.REPEATED)
+    if said.lost_at is not None and moment.has_come(said.lost_at + estop.OUTLASTS_LOSS):
+        is_over = True
+        doubt = doubt or (estop.FRAMES_LOST if said.said is TRUE else None)
     value = UNKNOWN if is_over else said.said
     return new(Stop, (value, said.text, said.ready >= estop.READY_MESSAGES, doubt))
 

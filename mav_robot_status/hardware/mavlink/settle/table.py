@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 
 from ....interface.status import TriState
 from ....mavlink.enumerations import MAV_LANDED_STATE_UNDEFINED, MAV_STANDARD_MODE_NON_STANDARD
-from ..armed import may_move
 from ..autopilots.modes import ModeHints
 from ..facts import (
     Cause,
@@ -24,7 +23,6 @@ from ..failure_flags import failures
 from ..state import (
     text_assembly,
 )
-from ..state.claims import HOLD, LIVE, NEVER
 from ..state.latest_messages import FRESH
 from ..state.vehicle_state import timeout_of
 from .causes import arming, explained, faults, latched, reported_by_parts, sys_status
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
     from ....mavlink.definitions import Heartbeat
     from ..moment import Moment
     from ..options import HardwareOptions
-    from ..state.claims import Claim
     from ..state.vehicle_state import VehicleState
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
@@ -45,8 +42,7 @@ CURRENT_MODE_FRESH: Final = 5.0
 """Seconds for which a CURRENT_MODE is valid."""
 
 NO_HINTS: Final = ModeHints()
-UNDISPUTED: Final = Claimed(None, False, False, False, False)
-DOUBTED: Final = UNDISPUTED._replace(doubted=True)
+UNDISPUTED: Final = Claimed(None, False)
 
 
 def kind(state: VehicleState, moment: Moment, options: HardwareOptions) -> Kind:
@@ -99,6 +95,8 @@ def fresh(state: VehicleState, moment: Moment, options: HardwareOptions) -> Fres
         velocity,
         velocity == "GLOBAL_POSITION_INT",
         is_fresh(latest.gps, FRESH),
+        moment.is_within(state.arrived + timeout_of(state, options)),
+        latest.heartbeat is not None and state.told_armed > latest.heartbeat.at,
     )
 
 
@@ -118,45 +116,6 @@ def mode_hints(state: VehicleState, moment: Moment, options: HardwareOptions) ->
     if current is not None and current.message.custom_mode == number and moment.is_fresh(current, CURRENT_MODE_FRESH):
         standard_mode = current.message.standard_mode
     return ModeHints(state.modes.get(number), standard_mode)
-
-
-def claimed(state: VehicleState, moment: Moment, options: HardwareOptions) -> Claimed:
-    """Whether another sender claims the ids. "Not able to move" is doubtful while any live claim says otherwise."""
-    claims = state.claims
-    conflict = claims.conflict
-    mine = claims.mine
-    if conflict is None and not claims.others and (mine is None or mine.doubt_at == NEVER):
-        return UNDISPUTED
-    if conflict is not None and not moment.has_come(conflict.last + HOLD):
-        since = conflict.since.unix_us
-        armed = _armed(state)
-        all_armed = armed is TRUE and moment.has_come(claims.disarmed_at + HOLD)
-        all_disarmed = (
-            armed is FALSE
-            and moment.has_come(claims.armed_at + HOLD)
-            and all(moment.has_come(claim.doubt_at + LIVE) for claim in claims.others.values())
-        )
-        one_mode = moment.has_come(claims.differed_at + HOLD)
-        return new(Claimed, (since, True, all_armed, all_disarmed, one_mode))
-    if _is_at_rest(state, mine) and (
-        (mine is not None and not moment.has_come(mine.doubt_at + LIVE))
-        or any(not moment.has_come(c.doubt_at + LIVE) for c in claims.others.values())
-    ):
-        return DOUBTED
-    return UNDISPUTED
-
-
-def _is_at_rest(state: VehicleState, mine: Claim | None) -> bool:
-    """Whether the selected sender says disarmed, or armed in a state without motion."""
-    armed = _armed(state)
-    return armed is FALSE or (armed is TRUE and mine is not None and not may_move(mine.heartbeat))
-
-
-def _armed(state: VehicleState) -> TriState:
-    """Whether the selected sender says armed."""
-    if state.high_latency is not None:
-        return state.high_latency.armed
-    return TRUE if state.heartbeats.armed else FALSE
 
 
 def text_overdue(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
@@ -193,7 +152,7 @@ SETTLE: Final[dict[str, Settle]] = {
     "parts": reported_by_parts,
     "arming": arming,
     "mode_hints": mode_hints,
-    "claimed": claimed,
+    "claimed": lambda state, moment, options: UNDISPUTED,
     "text_overdue": text_overdue,
 }
 """The function that settles each fact, in the order of `Facts`."""
@@ -202,6 +161,7 @@ assert tuple(SETTLE) == Facts._fields
 _ALL: Final = tuple(SETTLE.values())
 
 
-def facts_of(state: VehicleState, moment: Moment, options: HardwareOptions) -> Facts:
+def facts_of(state: VehicleState, moment: Moment, options: HardwareOptions, claimed: Claimed = UNDISPUTED) -> Facts:
     """The facts of a vehicle at a moment. `moment.next` is then the first time at which one may change."""
-    return new(Facts, [settle(state, moment, options) for settle in _ALL])
+    facts: Facts = new(Facts, [settle(state, moment, options) for settle in _ALL])
+    return facts if claimed is UNDISPUTED else facts._replace(claimed=claimed)

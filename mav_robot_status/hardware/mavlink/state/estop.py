@@ -43,6 +43,8 @@ SETTLING: Final = 2.0
 """Seconds after a disarm, a connection or a report of the stop before a healthy PREARM_CHECK bit is used: ArduPilot
 recomputes it once a second, and forces it healthy while armed."""
 READY_MESSAGES: Final = 2
+OUTLASTS_LOSS: Final = 5.0
+"""Seconds after which what was said once is unknown, if frames were lost since."""
 REPEATED: Final = 35.0
 """Seconds after which a PreArm text that is no longer repeated (every 30 s) is over."""
 
@@ -73,8 +75,14 @@ class Stop(NamedTuple):
     ready_at: float = 0.0
     doubt: str | None = None
     """Why a stop may last: there was evidence of it, and none of its end. None: no such evidence."""
+    lost_at: float | None = None
+    """Since when frames are lost after the report: one of them may have said the opposite."""
+    rested: bool = False
+    """Whether the vehicle was seen at rest since the report."""
 
 
+FRAMES_LOST: Final = "a stop was reported, and frames have been lost since"
+STARTED: Final = "a stop was reported, and since then the vehicle has started from rest"
 LINK_LOST: Final = "a stop was reported, and the link has been lost since"
 UNDER_POWER: Final = "a stop was reported, and since then there are signs of power"
 UNANSWERED: Final = "a command to stop or to release has no clear acknowledgement"
@@ -92,6 +100,8 @@ NOTHING: Final = Stop()
 def said(stop: Stop, engaged: bool, text: str | None, now: Instant, source: str | None = None) -> Stop:
     """`stop` after a report that an emergency stop is engaged or released: in a text, or by another `source`."""
     value = TriState.TRUE if engaged else TriState.FALSE
+    if now.mono < stop.last and stop.said is not TriState.UNKNOWN:
+        return stop  # it arrives late: a newer report is known
     return Stop(
         said=value,
         text=text,
@@ -102,6 +112,22 @@ def said(stop: Stop, engaged: bool, text: str | None, now: Instant, source: str 
         ready=0 if engaged else stop.ready,
         ready_at=stop.ready_at,
     )
+
+
+def lost(stop: Stop, since: float) -> Stop:
+    """`stop` after frames were lost since a time. The first loss after the report counts."""
+    if stop.said is TriState.UNKNOWN or stop.lost_at is not None or since < stop.last:
+        return stop
+    return stop._replace(lost_at=since)
+
+
+def moved(stop: Stop, moves: TriState, now: float) -> Stop:
+    """`stop` while the vehicle is at rest or in motion: a stopped one may coast, but does not start from rest."""
+    if stop.said is not TriState.TRUE or moves is TriState.UNKNOWN:
+        return stop
+    if moves is TriState.FALSE:
+        return stop if stop.rested else stop._replace(rested=True)
+    return doubted(stop, STARTED, now) if stop.rested else stop
 
 
 def doubted(stop: Stop, why: str, now: float) -> Stop:

@@ -44,10 +44,11 @@ MOST_MODES: Final = 64
 """ArduPilot's modes have smaller numbers. What UV Radio Room sends as custom_mode is greater."""
 
 LEAST_TIMEOUT: Final = 60.0
-"""Seconds without a message after which the link counts as lost, at least."""
+"""Seconds without a message after which the link counts as lost, before the second interval."""
 LONGEST_TIMEOUT: Final = 3600.0
 INTERVALS: Final = 3
 """The link counts as lost after this many of the longest interval."""
+MARGIN: Final = 0.5  # s
 REMEMBERED: Final = 5
 """Intervals of which the longest counts: a pause does not make the time-out long for ever."""
 PERIODS: Final = {MAV_AUTOPILOT_PX4: 1 / 0.015}
@@ -185,8 +186,9 @@ def returned(before: HighLatency, message: HighLatency2, now: Instant, options: 
 
 def timeout(known: HighLatency) -> float:
     """Seconds without a message after which the link counts as lost, if the site does not say."""
-    longest = max((*known.intervals, PERIODS.get(known.message.autopilot, 0.0)))
-    return min(max(LEAST_TIMEOUT, INTERVALS * longest), LONGEST_TIMEOUT)
+    if len(known.intervals) < 2:
+        return max(LEAST_TIMEOUT, INTERVALS * PERIODS.get(known.message.autopilot, 0.0))
+    return min(INTERVALS * max(known.intervals) + MARGIN, LONGEST_TIMEOUT)
 
 
 def speed(message: HighLatency2) -> float:

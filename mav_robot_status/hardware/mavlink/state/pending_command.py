@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from ....mavlink.enumerations import (
+    MAV_CMD_COMPONENT_ARM_DISARM,
     MAV_CMD_DO_AUX_FUNCTION,
     MAV_CMD_DO_FLIGHTTERMINATION,
     MAV_RESULT_IN_PROGRESS,
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from ....mavlink.definitions import CommandAck, CommandInt, CommandLong
     from .estop import Stop
 
-COMMANDS: Final = frozenset({MAV_CMD_DO_FLIGHTTERMINATION, MAV_CMD_DO_AUX_FUNCTION})
+COMMANDS: Final = frozenset({MAV_CMD_COMPONENT_ARM_DISARM, MAV_CMD_DO_FLIGHTTERMINATION, MAV_CMD_DO_AUX_FUNCTION})
 LOW, MIDDLE, HIGH = 0, 1, 2  # the positions of a switch
 ENGAGES: Final[dict[tuple[float, float], bool]] = {
     (MOTOR_ESTOP, LOW): False,

@@ -28,6 +28,8 @@ PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 
+GRACE: Final = 10.0
+"""Seconds after boot during which sensor bits raise no error."""
 DEBOUNCE_MESSAGES: Final = 2
 DEBOUNCE_SECONDS: Final = 1.5
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ....clock import Instant
 from ....mavlink.enumerations import MAV_VTOL_STATE_MC, MAV_VTOL_STATE_UNDEFINED
@@ -29,8 +29,6 @@ from . import (
     text_assembly,
 )
 from . import readiness as reasons
-from .boot_clock import BootClock
-from .claims import Claims
 from .heartbeat_history import HeartbeatHistory, first_heartbeat
 from .latest_messages import LatestMessages, heard
 from .lift import Lift
@@ -71,9 +69,18 @@ class VehicleState:
 
     latest: LatestMessages
     heartbeats: HeartbeatHistory
-    boot: BootClock
+    booted: float
+    """When the autopilot booted by its clock, monotonic seconds; the first heartbeat while there is no clock."""
     vehicle_type: int
     autopilot: int
+    has_clock: bool = False
+    """Whether `booted` is by its clock."""
+    arrived: float = -math.inf
+    """When the latest news of any kind arrived while the link was alive, monotonic seconds."""
+    timeout: float | None = field(default=None, compare=False)
+    """Seconds after which its link counts as lost, if the site says so. It is given from outside."""
+    told_armed: float = -math.inf
+    """When a text, an event or an acknowledgement last said that it may have been armed, monotonic seconds."""
     shown: Autopilot | None = None
     """The software identified by SYS_STATUS, if it differs from the announced one."""
     faults: sensors.Faults = field(default_factory=dict)
@@ -136,8 +143,6 @@ class VehicleState:
     """Reboots seen."""
     started_at: float | None = None
     """When the autopilot sent a text that it sends only while it starts, since the last heartbeat."""
-    claims: Claims[Any] = field(default_factory=Claims, compare=False)
-    """Who speaks with its ids. It outlives reboots, and the vehicle itself."""
     event_table: EventTable | None = field(default=None, compare=False)
     """The words for its events. It is given from outside, and outlives reboots."""
 
@@ -171,7 +176,7 @@ class VehicleState:
     def become(self, other: VehicleState) -> None:
         """Replace everything by the contents of `other`, except for what is given from outside."""
         for name in self.__slots__:
-            if name != "event_table":
+            if name not in ("event_table", "timeout", "arrived"):
                 setattr(self, name, getattr(other, name))
 
     def show(self, profile: Autopilot) -> None:
@@ -180,24 +185,23 @@ class VehicleState:
         self.latest.unsettled = True
 
 
-def begin(heartbeat: Heartbeat, now: Instant, claims: Claims[Any] | None = None) -> VehicleState:
+def begin(heartbeat: Heartbeat, now: Instant) -> VehicleState:
     """The state of a vehicle at its first heartbeat."""
     latest = LatestMessages()
     latest.heartbeat = heard(latest, heartbeat, now.mono, None)
     return VehicleState(
         latest=latest,
         heartbeats=first_heartbeat(heartbeat, now),
-        boot=BootClock(now.mono),
+        booted=now.mono,
         vehicle_type=heartbeat.type,
         autopilot=heartbeat.autopilot,
-        claims=claims or Claims(),
     )
 
 
 def timeout_of(state: VehicleState, options: HardwareOptions) -> float:
     """Seconds without a heartbeat after which the link of a vehicle counts as lost."""
-    if state.claims.timeout is not None:
-        return state.claims.timeout
+    if state.timeout is not None:
+        return state.timeout
     if state.high_latency is None:
         return options.heartbeat_timeout
     return max(high_latency.timeout(state.high_latency), options.heartbeat_timeout)

@@ -83,37 +83,11 @@ def test_a_flood_uses_bounded_memory(ear: Ear) -> None:
     assert ear.found.counters.frames == MOST_SPEAKERS * 2 + 1
 
 
-def test_alternating_autopilots_are_two_and_a_replaced_one_is_not(ear: Ear) -> None:
-    ear.hear(ROVER)
-    ear.hear(COPTER, 1)
-    assert ear.found.speakers[0].conflict == ""
-    ear.hear(ROVER, 2)
-    assert "ARDUPILOTMEGA QUADROTOR and ARDUPILOTMEGA GROUND_ROVER" in ear.found.speakers[0].conflict
-
-
-def test_a_component_with_the_ids_of_the_autopilot_is_not_a_second_vehicle(ear: Ear) -> None:
-    for beat in range(4):
-        ear.hear((ROVER, GIMBAL)[beat % 2], beat)
-    assert ear.found.speakers[0].conflict == ""
-
-
-def test_two_alternating_boot_clocks_are_two_autopilots(ear: Ear) -> None:
-    ear.hear(attitude(0), 0, A)
-    ear.hear(SystemTime(0, 60_000), 0, B)
-    ear.hear(attitude(1000), 1, A)
-    assert ear.found.speakers[0].conflict == ""
-    ear.hear(SystemTime(0, 61_000), 1, B)
-    assert ear.found.speakers[0].conflict == "alternating clocks that started 60 s apart"
-
-
-def test_reboots_and_paths_with_different_delays_are_one_autopilot(ear: Ear) -> None:
-    for boot in range(6):  # each boot restarts the clock
-        for at in range(3):
-            ear.hear(attitude(at * 1000), boot * 60 + at)
-    for at in range(400, 420):
-        ear.hear(attitude(at * 1000), at, A)
-        ear.hear(attitude((at - 4) * 1000), at, B)
-    assert ear.found.speakers[0].conflict == ""
+def test_a_component_that_is_an_autopilot_in_one_heartbeat_is_one(ear: Ear) -> None:
+    for message in (GIMBAL, ROVER, GIMBAL):
+        ear.hear(message)
+    ear.hear(GIMBAL, system=2)
+    assert [speaker.pilot for speaker in ear.found.speakers] == [True, False]
 
 
 def test_a_clock_counts_only_if_its_time_is_set(ear: Ear) -> None:

@@ -19,12 +19,22 @@ from mav_robot_status.diagnosis.doctor.findings import (
 )
 from mav_robot_status.diagnosis.doctor.rendering import as_text, remarks
 from mav_robot_status.hardware.mavlink.autopilots.wanted import COMMON
+from mav_robot_status.hardware.mavlink.senders import Sender, Strangers
 from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.counters import Counters
 
 STATUS = VehicleStatus("HOLD", {"mode": "MANUAL", "in_error": None, "in_motion": False}, (), ("DISARMED",), COMMON)
 ROVER = Speaker(1, 1, 3, 10, {0: 5, 1: 5, 33: 1}, {0: 1.0, 1: 1.0}, 11, pilot=True, status=STATUS)
 GCS = Speaker(255, 190, 8, 6, {0: 5}, {0: 1.0}, 5)
+SENDER = Sender("A", 1, 7.0, "first heard", "GROUND_ROVER", True, 3.2)
+
+
+def speaking(**changes: Any) -> Speaker:
+    """A rover with other senders."""
+    return ROVER._replace(status=STATUS._replace(**changes))
+
+
+TWO = speaking(strangers=Strangers("A and B", "udp:0.0.0.0:1?from=A"))
 MUTE = ROVER._replace(counts={0: 5})
 SERIAL, OUT, TCP = "/dev/ttyX,57600", "udpout:h:1", "tcp:h:1"
 
@@ -81,7 +91,10 @@ DIAGNOSES = [
         *(heard(ROVER._replace(status=None), signing=True, counters=Counters(frames=11, signed=11)), "not-believed"),
         *("with another key", "the vehicle's own key"),
     ),
-    (heard(ROVER._replace(conflict="so it is")), "two-vehicles", "use the ids 1.1: so it is", "MAV_SYSID"),
+    (heard(TWO), "two-vehicles", "two senders speak as vehicle 1.1: A and B", "yours, name it: udp:0.0.0.0:1?from=A"),
+    (heard(speaking(strangers=Strangers("A and B", None))), "two-vehicles", "1.1: A and B", "MAV_SYSID"),
+    (heard(speaking(senders=(SENDER,))), "late", "vehicle 1.1 is heard 7.0 s late", "a radio or a program"),
+    (heard(speaking(senders=(SENDER._replace(lag=2.9),))), "ok", "a status is available", ""),
     (heard(MUTE, counters=Counters(frames=11, signed=9)), "signed", "9 of 11 frames are signed", "--signing-key"),
     (heard(ROVER._replace(counts={0: 1, 1: 1})), "few-heartbeats", "1 HEARTBEAT of 1.1", "once a second"),
     (
@@ -138,7 +151,7 @@ def test_a_status_is_available_despite_a_different_message_definition() -> None:
 
 
 def test_two_vehicles_with_the_same_id_give_no_reliable_status() -> None:
-    assert not diagnose(heard(ROVER._replace(conflict="so it is"))).ok
+    assert not diagnose(heard(TWO)).ok
 
 
 def test_the_causes_are_distinct_and_the_last_one_always_applies() -> None:

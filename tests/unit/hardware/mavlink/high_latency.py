@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.belief import Belief
+from mav_robot_status.hardware.mavlink.interface import SETTLES, MavlinkRobotHW
+from mav_robot_status.hardware.mavlink.message_table import EDGES
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.state.claims import Claims
 from mav_robot_status.interface import RobotStatus
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.mavlink.framing import Frame
@@ -54,9 +55,9 @@ class Sky:
         if type(message) is mav.HighLatency2:
             seconds = self.clock.now().mono - self._start + 1000
             message = message._replace(**{"timestamp": round(seconds * 1000)} | told)
-        frame: Frame = frame_of(message)
-        self.hw.take(frame._replace(sequence=sequence), self.clock.now(), way)
-        return self.look()
+        frame: Frame = frame_of(message, sequence=sequence)
+        self.hw.take(frame, self.clock.now(), way)
+        return self.look() if frame.message_id in EDGES else self.wait(SETTLES + 1e-6)
 
     def beat(self, way: Any = "radio", *, armed: bool = False, autopilot: int = ARDUPILOT, **how: Any) -> RobotStatus:
         number = 4 if autopilot == ARDUPILOT else 4 << 16 | 4 << 24
@@ -92,9 +93,9 @@ class Sky:
         return str(self.detail.link.value)
 
     @property
-    def claims(self) -> Claims[Any]:
-        claims: Claims[Any] = self.vehicle.claims
-        return claims
+    def belief(self) -> Belief:
+        belief: Belief = self.vehicle.belief
+        return belief
 
     @property
     def codes(self) -> list[int]:

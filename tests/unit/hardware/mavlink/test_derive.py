@@ -51,7 +51,7 @@ def test_every_field_has_evidence() -> None:
     assert all(why.rule for why in evidence.values())
     assert evidence["drives_powered"].source == "HEARTBEAT.base_mode 1"
     flight.stop().wait(5)
-    assert {why.rule for why in flight.vehicle.handle.evidence.values()} == {"no heartbeat within heartbeat_timeout"}
+    assert {why.rule for why in flight.vehicle.handle.evidence.values()} == {"no frame within heartbeat_timeout"}
 
 
 def test_the_bits_of_the_inhibits_are_those_of_the_specification() -> None:
@@ -71,6 +71,7 @@ def test_the_bits_of_the_inhibits_are_those_of_the_specification() -> None:
         (12, "MODE_MANUAL"),
         (13, "STOP_UNCERTAIN"),
         (14, "SENDER_UNCERTAIN"),
+        (15, "HEARTBEAT_LATE"),
     ]
 
 

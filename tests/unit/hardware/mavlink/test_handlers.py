@@ -69,11 +69,11 @@ def moving(flight: Flight, message: Any, seconds: float = 2.0) -> TriState:
 
 def test_latches_survive_a_short_loss_and_not_a_long_one() -> None:
     flight = copter().text("Crash: Disarming: AngErr=42", 0)
-    flight.stop("heartbeat").wait(20)
+    flight.stop().wait(20)
     assert flight.codes == []
-    assert flight.stream("heartbeat", flight.heartbeat).look().codes == [4001]
-    flight.stop("heartbeat").wait(31)
-    assert flight.stream("heartbeat", flight.heartbeat).look().codes == []
+    assert flight.resume().look().codes == [4001]
+    flight.stop().wait(31)
+    assert flight.resume().look().codes == []
 
 
 def test_another_autopilot_with_the_same_ids_starts_with_a_new_state() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import given
@@ -277,18 +277,37 @@ def test_messages_that_a_satellite_kept_and_sends_together_have_their_own_times(
 # -- time --------------------------------------------------------------------------------------------------------------
 
 
-def test_the_time_out_is_three_of_the_longest_interval_and_at_least_a_minute() -> None:
+class Link(NamedTuple):
+    """A channel whose link has a time-out of its own."""
+
+    name: str
+    heartbeat_timeout: float | None
+
+
+def test_the_time_out_is_a_minute_and_from_the_second_interval_on_three_of_the_longest() -> None:
     sky = Sky()
     sky.send(ardupilot(ARMED))
     sky.wait(LEAST_TIMEOUT)
     assert sky.link == "CONNECTED"
     assert sky.wait(0.1).mode is RobotMode.UNKNOWN
     assert (sky.detail.link, sky.inhibits) == (LinkState.LOST, ["LINK_STALE"])
-    sky.wait(40)
-    sky.send(ardupilot(ARMED))  # 100 s after the first
-    sky.wait(300)
+    for interval in (5.0, 5.0, 4.0):
+        sky.send(ardupilot(ARMED))
+        sky.wait(interval)
+    sky.send(ardupilot(ARMED))  # the longest is that across the loss, 60.1 s
+    sky.wait(180.5)
     assert sky.link == "CONNECTED"
     sky.wait(1)
+    assert sky.link == "LOST"
+
+
+def test_a_disarmed_vehicle_that_falls_silent_is_lost_after_three_of_its_intervals() -> None:
+    sky = Sky()
+    for _ in range(3):
+        sky.send(ardupilot(DISARMED))
+        sky.wait(5.0)
+    assert sky.wait(10.4).drives_powered is FALSE
+    assert sky.wait(0.2).drives_powered is UNKNOWN
     assert sky.link == "LOST"
 
 
@@ -320,21 +339,19 @@ def test_a_pause_is_forgotten_and_no_time_out_is_longer_than_an_hour() -> None:
 
 def test_a_link_has_a_time_out_of_its_own() -> None:
     sky = Sky()
-    sky.hw.link_timeout = {"satellite": 120.0, "radio": None}.get
-    sky.send(ardupilot(ARMED))
+    sky.send(ardupilot(ARMED), Link("satellite", 120.0))
     sky.wait(119)
     assert sky.link == "CONNECTED"
     sky.wait(2)
     assert sky.link == "LOST"
-    sky.beat("radio")
+    sky.beat(Link("radio", None))
     sky.wait(4)
     assert sky.link == "LOST"
 
 
 def test_a_link_time_out_holds_for_heartbeats_too() -> None:
     sky = Sky()
-    sky.hw.link_timeout = lambda way: 20.0
-    sky.beat()
+    sky.beat(Link("radio", 20.0))
     sky.wait(19)
     assert sky.link == "CONNECTED"
     sky.wait(2)
@@ -403,7 +420,7 @@ def test_high_latency2_counts_when_the_heartbeats_are_lost(way: str) -> None:
     sky.wait(3)
     assert sky.send(ardupilot(ARMED), way).motion_possible is TRUE  # by the HEARTBEAT
     sky.wait(1)
-    assert sky.link == "LOST"
+    assert sky.inhibits == ([] if way == "satellite" else ["HEARTBEAT_LATE"])
     status = sky.send(ardupilot(ARMED), way)
     assert (status.drives_powered, status.motion_possible, sky.detail.vehicle.state) == (TRUE, UNKNOWN, None)
     sky.wait(60)
@@ -421,6 +438,10 @@ def test_a_stop_that_was_said_before_the_heartbeats_were_lost_stays_a_doubt() ->
     sky.send(ardupilot(ARMED))
     sky.wait(5)
     status = sky.beat("radio", armed=True)
+    assert (status.e_stopped, status.drives_powered) == (UNKNOWN, TRUE)  # by satellite, where nobody spoke of a stop
+    for _ in range(12):
+        sky.wait(1)
+        status = sky.beat("radio", armed=True)
     assert (status.e_stopped, status.drives_powered) == (UNKNOWN, UNKNOWN)
 
 
@@ -501,23 +522,26 @@ def test_an_armed_high_latency2_is_held_against_disarmed_heartbeats() -> None:
     sky.beat("radio")
     sky.wait(1)
     assert sky.beat("radio").drives_powered is FALSE
-    assert sky.send(ardupilot(ARMED)).drives_powered is UNKNOWN
-    assert sky.inhibits == ["SENDER_UNCERTAIN"]
-    for _ in range(30):
+    for second in range(20):
+        if second % 5 == 0:
+            sky.send(ardupilot(ARMED))
         sky.wait(1)
-        assert sky.beat("radio").drives_powered is UNKNOWN
+        assert sky.beat("radio").drives_powered is TRUE
+        assert sky.inhibits == ["SENDER_UNCERTAIN"]
     assert sky.send(ardupilot(DISARMED)).drives_powered is FALSE
-    assert sky.claims.conflict is None  # a slow link is no second vehicle
 
 
-def test_one_that_never_says_disarmed_counts_for_a_minute() -> None:
+def test_an_armed_one_that_falls_silent_counts_for_three_of_its_intervals() -> None:
     sky = Sky()
-    sky.beat("radio")
-    sky.send(ardupilot(ARMED))
-    for _ in range(61):
+    for _ in range(2):
+        sky.send(ardupilot(ARMED))
+        for _ in range(5):
+            sky.beat("radio")
+            sky.wait(1)
+    for _ in range(12):
+        assert sky.beat("radio").drives_powered is TRUE
         sky.wait(1)
-        sky.beat("radio")
-    assert sky.status.drives_powered is FALSE
+    assert sky.beat("radio").drives_powered is FALSE
 
 
 def test_high_latency2_without_a_word_of_arming_is_not_held_against_heartbeats() -> None:
@@ -528,35 +552,34 @@ def test_high_latency2_without_a_word_of_arming_is_not_held_against_heartbeats()
         sky.wait(1)
 
 
-@pytest.mark.parametrize("way", ["satellite", "radio"])
-def test_another_kind_of_vehicle_with_the_same_ids_is_a_conflict(way: str) -> None:
+@pytest.mark.parametrize(("way", "expected"), [("satellite", FALSE), ("radio", UNKNOWN)])
+def test_another_kind_of_vehicle_with_the_same_ids_is_a_conflict(way: str, expected: TriState) -> None:
+    """Both say disarmed. In one count nobody can tell them apart."""
     sky = Sky()
-    sky.beat("radio")
-    status = sky.send(ardupilot(DISARMED, type=ROVER), way)
-    assert (status.drives_powered, status.error_code) == (FALSE, causes.SYSTEM_ID_CONFLICT)  # on that they agree
-    assert sky.send(ardupilot(ARMED, type=ROVER), way).drives_powered is UNKNOWN
-    for _ in range(30):
+    for _ in range(8):
+        sky.beat("radio")
+        sky.send(ardupilot(DISARMED, type=ROVER), way)
         sky.wait(1)
-        assert sky.beat("radio").drives_powered is UNKNOWN
+    status = sky.beat("radio")
+    assert (status.drives_powered, status.error_code) == (expected, causes.SYSTEM_ID_CONFLICT)
 
 
-def test_an_armed_high_latency2_on_the_way_of_disarmed_heartbeats_is_a_doubt() -> None:
+def test_an_armed_high_latency2_on_the_way_of_disarmed_heartbeats_is_a_doubt_until_the_next_one() -> None:
     sky = Sky()
     sky.beat("radio")
+    sky.wait(0.5)
     assert sky.send(ardupilot(ARMED), "radio").drives_powered is UNKNOWN
-    for _ in range(10):
-        sky.wait(1)
-        assert sky.beat("radio").drives_powered is UNKNOWN
-    assert sky.send(ardupilot(DISARMED), "radio").drives_powered is FALSE
+    assert sky.wait(0.4).drives_powered is UNKNOWN
+    assert sky.beat("radio").drives_powered is FALSE
 
 
 def test_a_vehicle_whose_satellite_gives_it_a_new_address_is_followed() -> None:
     sky = Sky()
     for number in range(10):
         sky.send(px4(), f"port {number}", sequence=number)
-        assert sky.claims.way == f"port {number}"
+        assert sky.belief.channel == f"port {number}"
         sky.wait(67)
-    assert sky.claims.conflict is None
+    assert sky.codes == []
 
 
 def test_a_disarmed_message_from_a_new_address_waits_until_the_old_one_is_lost() -> None:
@@ -566,19 +589,7 @@ def test_a_disarmed_message_from_a_new_address_waits_until_the_old_one_is_lost()
         sky.wait(4.9)
         assert sky.send(ardupilot(DISARMED), "port 2").drives_powered is TRUE
     sky.wait(2)
-    status = sky.send(ardupilot(DISARMED), "port 2")
-    assert status.drives_powered is UNKNOWN  # it contradicts the last word
-    for _ in range(12):
-        sky.wait(5)
-        status = sky.send(ardupilot(DISARMED), "port 2")
-    assert status.drives_powered is FALSE
-
-
-def test_a_signed_vehicle_is_not_contradicted() -> None:
-    sky = Sky()
-    sky.beat("radio")
-    sky.claims.verified("radio", sky.clock.now().mono)
-    assert sky.send(ardupilot(ARMED)).drives_powered is FALSE
+    assert sky.send(ardupilot(DISARMED), "port 2").drives_powered is FALSE
 
 
 WORDS = st.sampled_from(
@@ -670,16 +681,7 @@ def test_an_armed_message_is_held_against_heartbeats_in_a_state_without_motion_o
         sky.wait(0.5)
 
 
-def test_an_armed_message_beside_heartbeats_is_held_against_a_disarmed_sender_after_they_end() -> None:
-    sky = after_heartbeats("radio")
-    sky.wait(1.0)
-    sky.send(ardupilot(ARMED), "radio")
-    sky.wait(1.6)
-    for _ in range(30):
-        assert sky.beat("forger").drives_powered is not FALSE
-        assert sky.wait(1.0).drives_powered is not FALSE
-
-
+@pytest.mark.xfail(strict=True, reason="two vehicles in one count, whose clocks are those of HIGH_LATENCY2")
 def test_of_two_vehicles_on_one_satellite_the_disarmed_one_with_the_later_clock_is_not_believed() -> None:
     sky = Sky()
     for number in range(12):

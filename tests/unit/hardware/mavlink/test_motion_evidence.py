@@ -157,7 +157,8 @@ def test_rotation_shows_motion_only_while_it_is_reported() -> None:
     flight = turning(SUB, 0.3).stop("attitude")
     flight.wait(5)
     assert flight.status.in_motion is UNKNOWN
-    flight = turning(SUB, 0.3).stop("attitude").stream("attitude", lambda: mav.Attitude(90_000, 0, 0, 0.0), hz=4)
+    flight = turning(SUB, 0.3).stop("attitude")
+    flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0, 0, 0.0), hz=4)
     flight.wait(2)
     assert flight.status.in_motion is UNKNOWN
 

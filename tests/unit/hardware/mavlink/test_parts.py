@@ -64,12 +64,13 @@ def test_a_faulty_battery_is_an_error_with_its_words(charge: int, faults: int, e
 
 def test_one_report_is_no_error_and_the_second_is() -> None:
     """Recorded: a healthy battery is UNHEALTHY in its first message."""
-    flight = ready().send(mav.BatteryStatus(0, UNHEALTHY, 0))
-    flight.wait(2)
+    flight = ready()
+    sent_us = flight.clock.now().unix_us
+    flight.send(mav.BatteryStatus(0, UNHEALTHY, 0)).wait(2)
     assert flight.codes == []
     flight.send(mav.BatteryStatus(0, UNHEALTHY, 0))
     assert flight.codes == [2014]
-    assert flight.detail.errors[0].since_us == flight.clock.now().unix_us - 2_000_000
+    assert flight.detail.errors[0].since_us == sent_us
     flight.send(mav.BatteryStatus(0, OK, 0))
     assert flight.codes == []
 

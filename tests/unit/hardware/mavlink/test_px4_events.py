@@ -282,7 +282,7 @@ def test_lost_events_are_not_asked_for_without_the_option() -> None:
 def test_a_disarmed_px4_without_a_report_is_asked_once_for_each_connection_and_boot() -> None:
     flight = later(grounded(), 15)
     assert questions(flight) == 1
-    flight.stop("heartbeat").wait(6)
+    flight.stop().wait(6)
     assert questions(later(flight.resume(), 15)) == 2
     flight.stream("clock", flight.system_time).wait(2)
     assert questions(later(flight.reboot(0.0), 15)) == 3

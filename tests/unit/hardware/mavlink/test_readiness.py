@@ -142,8 +142,8 @@ def test_an_ardupilot_that_is_not_ready_is_asked_once_why() -> None:
 def test_it_is_asked_again_after_a_link_loss_and_after_a_reboot() -> None:
     flight = not_ready().stream("time", lambda: flight.system_time())
     flight.wait(10)
-    flight.stop("heartbeat", "sys_status").wait(5)
-    flight.resume().wait(10)
+    flight.stop().wait(5)
+    flight.resume().stream("time", lambda: flight.system_time()).wait(10)
     assert asked(flight) == 2
     flight.reboot().wait(20)
     assert flight.vehicle.boots == 1

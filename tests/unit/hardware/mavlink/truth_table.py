@@ -10,7 +10,6 @@ from mav_robot_status.clock import Instant
 from mav_robot_status.hardware.mavlink.handlers import hear
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.state import estop, latches, motion, outputs, sensors
-from mav_robot_status.hardware.mavlink.state.boot_clock import BootClock
 from mav_robot_status.hardware.mavlink.state.vehicle_state import VehicleState, begin
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink import definitions as mav
@@ -29,7 +28,7 @@ def state_of(inputs: dict[str, Any]) -> tuple[VehicleState, Instant]:
     heartbeat = mav.Heartbeat(custom_mode, vehicle_type, autopilot, base_mode, state, 3)
     before = Instant(NOW.mono - 0.5, NOW.unix_us - 500_000)
     state = begin(heartbeat, before)
-    state.boot = BootClock(NOW.mono - UPTIME_MS / 1000)
+    state.booted, state.arrived = NOW.mono - UPTIME_MS / 1000, before.mono
     if "ss" in inputs:
         words = [*inputs["ss"], 0, 0, 0][:6]
         errors = inputs.get("ierr", 0)

@@ -97,7 +97,7 @@ def test_a_version_stays_during_a_link_loss_and_is_forgotten_at_a_reboot() -> No
 def test_a_version_told_after_the_boot_survives_the_detection_of_that_boot() -> None:
     flight = copter()
     flight.stream("system_time", flight.system_time)
-    flight.wait(3)
+    flight.wait(3.5)
     flight.reboot(uptime_s=0.5)
     flight.text(BANNER, 6).wait(5)
     assert flight.vehicle.boots == 1

@@ -234,7 +234,7 @@ def test_a_termination_that_is_not_requested_or_not_accepted_is_ignored() -> Non
 
 def test_only_relevant_commands_are_kept() -> None:
     now = Instant(100.0, 0)
-    assert pending_command.asked(command(400, 1), STATION, NOTHING, now) is None
+    assert pending_command.asked(command(300, 1), STATION, NOTHING, now) is None
     kept = pending_command.asked(command(AUX, ESTOP, HIGH), STATION, NOTHING, now)
     assert kept is not None
     assert kept[:5] == (AUX, ESTOP, HIGH, STATION, 100.0)

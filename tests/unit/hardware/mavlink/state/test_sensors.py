@@ -50,7 +50,7 @@ def test_the_extended_word_counts_from_bit_32() -> None:
 
 def test_a_fault_counts_after_two_messages_or_a_second_and_a_half() -> None:
     state = begin(Heartbeat(0, 2, 0, 1, 3, 3), NOW)
-    state.boot.at = NOW.mono - 60
+    state.booted = NOW.mono - 60
 
     def counted(seconds: float) -> list[int]:
         return [fault.bit for fault in settle.faults(state, Moment(NOW.mono + seconds), HardwareOptions())]

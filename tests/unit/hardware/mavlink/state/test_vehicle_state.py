@@ -13,7 +13,7 @@ def test_a_state_starts_with_a_heartbeat_and_has_the_type_of_the_vehicle() -> No
     state = begin(Heartbeat(15, 10, 3, 0x81, 4, 3), NOW)
     assert (state.profile, state.family) == (ARDUPILOT, Family.ROVER)
     assert state.heartbeats.armed
-    assert state.boot.at == NOW.mono
+    assert (state.booted, state.has_clock) == (NOW.mono, False)
     state.show(INAV)
     assert (state.profile, state.shown) == (INAV, INAV)
 

@@ -1,0 +1,263 @@
+"""Updates a vehicle: a frame changes the state of its speaker; the states of all speakers give the status."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from ...mavlink.decode import text
+from ...mavlink.definitions import Heartbeat, Statustext
+from .armed import is_armed
+from .belief.belief import SAID_ONCE, Heard, Joined
+from .belief.clock import Change
+from .derive import derive
+from .facts import Claimed
+from .handlers import HANDLERS_BY_ID, pass_time
+from .handlers.heartbeat import exchanged, rebooted, starts_anew
+from .handlers.high_latency import follows, high_latency, sends_heartbeats
+from .identity import is_autopilot
+from .joined import joined
+from .message_table import HEARTBEAT_ID, HIGH_LATENCY_ID
+from .moment import Moment
+from .senders import LATE, stranger
+from .settle import facts_of
+from .settle.table import UNDISPUTED
+from .state import estop, motion
+from .state.high_latency import stated, tells_armed
+from .state.vehicle_state import VehicleState, begin, timeout_of
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable, Sequence
+
+    from ...clock import Instant
+    from ...mavlink.framing import Values
+    from .belief import Speaker
+    from .derive import Derived
+    from .facts import Facts
+    from .options import HardwareOptions
+    from .vehicle import TrackedVehicle
+
+log = logging.getLogger(__name__)
+
+PACE: Final = 30.0
+"""Seconds between two log lines of one kind about one vehicle."""
+JUST_AFTER: Final = 1e-3
+
+
+class Updated(NamedTuple):
+    """The result of `status_at`."""
+
+    facts: Facts
+    """Of the main speaker."""
+    derived: Derived | None
+    """The new status; None: what it rests on has not changed."""
+    due: float
+    """When (monotonic seconds) time alone may change the status."""
+
+
+# -- a frame -----------------------------------------------------------------------------------------------------------
+
+
+def on_frame(
+    tracked: TrackedVehicle, frame: Values, channel: Hashable, now: Instant, lag: float, options: HardwareOptions
+) -> Heard:
+    """A frame with the ids of a vehicle changes the state of its speaker. Returns what `belief` says of it."""
+    heard = tracked.belief.hear(frame, channel, now, lag)
+    if tracked.belief.changes:
+        _apply_changes(tracked, now, options)
+    speaker, said = heard.speaker, heard.said
+    if speaker is None:
+        return heard
+    _arrived(tracked, speaker, frame[3], now.mono, options)
+    if said is not None:
+        _use(tracked, speaker, frame[0], frame[3], said, options)
+        if tracked.belief.changes:
+            _apply_changes(tracked, now, options)
+    return heard
+
+
+def _arrived(tracked: TrackedVehicle, speaker: Speaker, message: Any, at: float, options: HardwareOptions) -> None:
+    """Any news keeps the link of a vehicle connected; once it is lost, only a HEARTBEAT of its autopilot does."""
+    state: VehicleState | None = speaker.state
+    if state is None:
+        return
+    is_heartbeat = type(message) is Heartbeat and is_autopilot(message, tracked.component)
+    if is_heartbeat or at - state.arrived <= timeout_of(state, options):
+        state.arrived = max(at, state.arrived)
+    if speaker.lost_since is not None:
+        state.stop = estop.lost(state.stop, speaker.lost_since)
+        speaker.lost_since = None
+
+
+def _apply_changes(tracked: TrackedVehicle, now: Instant, options: HardwareOptions) -> None:
+    """Apply what `belief` has found: a boot, an exchange of vehicles, and speakers that are one."""
+    changes, tracked.belief.changes = tracked.belief.changes, []
+    for change in changes:
+        speaker, state = change.speaker, change.speaker.state
+        if isinstance(change, Joined):
+            if change.booted is not None and state is not None:
+                rebooted(state, change.booted, now, by_clock=True)
+                speaker.newest.clear()
+            for message_id, message, said in change.kept:
+                newest = speaker.newest.get(message_id, -math.inf)
+                if message_id in SAID_ONCE or said.mono > newest:
+                    speaker.newest[message_id] = max(said.mono, newest)
+                    _arrived(tracked, speaker, message, said.mono, options)
+                    _use(tracked, speaker, message_id, message, said, options)
+        elif state is not None:
+            booted = speaker.clock.booted or now.mono
+            speaker.newest.clear()
+            if change.change is Change.BOOT:
+                rebooted(state, booted, now, by_clock=True)
+            else:
+                exchanged(state, booted, now)
+
+
+def _use(
+    tracked: TrackedVehicle, speaker: Speaker, message_id: int, message: Any, said: Instant, options: HardwareOptions
+) -> None:
+    """One message changes the state of a speaker."""
+    state: VehicleState | None = speaker.state
+    if message_id in (HEARTBEAT_ID, HIGH_LATENCY_ID):
+        beat = message if message_id == HEARTBEAT_ID else stated(message)
+        if not is_autopilot(beat, tracked.component):
+            return
+        if state is not None and message_id == HIGH_LATENCY_ID and not _adds(state, message, said, options):
+            _compare(speaker, state, beat, said)
+            return
+        speaker.claim(beat, said)
+        is_first = state is None
+        if state is None:
+            if tracked.belief.starts(speaker, lambda old: _says_that_it_starts(speaker, old, beat), said.mono):
+                return
+            state = speaker.state = begin(beat, said)
+            state.event_table, state.arrived = tracked.event_table, said.mono
+        state.timeout = getattr(speaker.channel, "heartbeat_timeout", None)
+        if is_first and message_id == HEARTBEAT_ID:
+            return
+    if state is None:
+        return
+    if speaker.clock.booted is not None:
+        state.booted, state.has_clock = speaker.clock.booted, True
+    if message_id == HIGH_LATENCY_ID:
+        high_latency(state, message, said, options)
+    elif (handler := HANDLERS_BY_ID.get(message_id)) is not None:
+        handler(state, message, said, options)
+
+
+def _adds(state: VehicleState, message: Any, said: Instant, options: HardwareOptions) -> bool:
+    """Whether a HIGH_LATENCY2 says something new: not while HEARTBEATs arrive, and not if it is older than the last."""
+    return not sends_heartbeats(state, said.mono, options) and follows(state, message)
+
+
+def _compare(speaker: Speaker, state: VehicleState, beat: Heartbeat, said: Instant) -> None:
+    """A HIGH_LATENCY2 that adds nothing still says armed or disarmed: armed is held against a disarmed HEARTBEAT."""
+    if tells_armed(beat):
+        speaker.compare(beat, said)
+        if is_armed(beat):
+            state.told_armed = said.mono
+
+
+def _says_that_it_starts(speaker: Speaker, old: Speaker, beat: Any) -> bool:
+    """Whether a new speaker says that it starts, as the next boot of an old one: in its HEARTBEAT, or in a text."""
+    state: VehicleState | None = old.state
+    if state is None or state.latest.heartbeat is None:
+        return False
+    texts = state.profile.requests.boot_texts
+    says = any(type(one.message) is Statustext and text(one.message.text) in texts for one in speaker.kept)
+    return says or starts_anew(state.latest.heartbeat.message, beat, state)
+
+
+# -- the status --------------------------------------------------------------------------------------------------------
+
+
+def status_at(tracked: TrackedVehicle, now: Instant, options: HardwareOptions) -> Updated | None:
+    """The status of a vehicle at `now`; None before its first HEARTBEAT."""
+    belief, due = tracked.belief, math.inf
+    for speaker in belief.speakers:
+        if speaker.state is not None:
+            due = min(due, _settle(speaker, speaker.state, now, options))
+    main = belief.choose(_is_connected, now.mono, options.heartbeat_timeout)
+    if main is None or main.state is None:
+        return None
+    rivals = belief.rivals(now.mono, options.heartbeat_timeout) if _is_connected(main) else []
+    if rivals:
+        due = min(due, min(one.stands_until for one in rivals) + JUST_AFTER)
+        _tell_strangers(tracked, main, rivals, now.mono)
+    claimed, until = _claimed(tracked, [main, *rivals], now)
+    if main.lag > LATE:
+        _tell_late(tracked, main, now.mono)
+    basis = (claimed, main.facts, *(one.facts for one in rivals))
+    if basis == tracked.basis:
+        return Updated(main.facts, None, min(due, until))
+    tracked.basis = basis
+    ids, before = tracked.ids or (0, 0), tracked.handle.detail
+    facts = [one.facts._replace(claimed=claimed) for one in (main, *rivals)]
+    every = [derive(one, ids, before, now, options) for one in facts]
+    derived = every[0] if len(every) == 1 else joined(every, before, now)
+    return Updated(facts[0], derived, min(due, until))
+
+
+def _settle(speaker: Speaker, state: VehicleState, now: Instant, options: HardwareOptions) -> float:
+    """Settle the facts of one speaker. Returns when time alone may change them."""
+    pass_time(state, now, options)
+    for moving in (state.motion, state.gps_motion, state.rotation):
+        motion.settle(moving, now.mono)
+    state.stop = estop.moved(state.stop, state.motion.value, now.mono)
+    moment = Moment(now.mono)
+    facts = facts_of(state, moment, options)
+    if facts != speaker.facts:
+        speaker.facts = facts
+    return moment.next if _is_connected(speaker) else math.inf
+
+
+def _is_connected(speaker: Speaker) -> bool:
+    facts: Facts | tuple[()] = speaker.facts
+    return bool(facts) and (facts.fresh.heartbeat or facts.fresh.link)  # type: ignore[union-attr]
+
+
+def _claimed(tracked: TrackedVehicle, speakers: Sequence[Speaker], now: Instant) -> tuple[Claimed, float]:
+    """Whether two vehicles use the ids, and until when (monotonic seconds) that lasts."""
+    belief = tracked.belief
+    conflict, until = belief.compare(speakers[1:], now)
+    mixed = belief.mixed(speakers, now.mono)
+    found = mixed or conflict
+    if found is None:
+        return UNDISPUTED, until
+    if tracked.conflict_since is not found.since:
+        tracked.conflict_since = found.since
+        channels = (count.channel for one in speakers for count in one.counts if count.channel is not None)
+        where = " and ".join(dict.fromkeys(map(str, channels)))
+        log.warning(
+            "two autopilots use the ids %d.%d%s (%s)", *(tracked.ids or (0, 0)), where and f": {where}", found.why
+        )
+    return Claimed(found.since.unix_us, mixed is not None), min(until, belief.ends(found))
+
+
+# -- what is told ------------------------------------------------------------------------------------------------------
+
+
+def _tell_strangers(tracked: TrackedVehicle, main: Speaker, rivals: Sequence[Speaker], now: float) -> None:
+    """Log who speaks with the ids of the vehicle, and what ends that."""
+    found = stranger(main, rivals, now) if now >= tracked.tell_strangers_at else None
+    if found is None:
+        return
+    tracked.tell_strangers_at = now + PACE
+    cure = (
+        f"If one of them is yours, name it: {found.mine}" if found.mine else "Give each vehicle a system id of its own."
+    )
+    log.warning("Two senders speak as vehicle %d.%d: %s. %s", *(tracked.ids or (0, 0)), found.who, cure)
+
+
+def _tell_late(tracked: TrackedVehicle, main: Speaker, now: float) -> None:
+    if now >= tracked.tell_late_at:
+        tracked.tell_late_at = now + PACE
+        where = f" on {main.channel}" if main.channel is not None else ""
+        log.warning(
+            "vehicle %d.%d is heard %.1f s late%s: what is older than its time-out is unknown. Look for a radio or a "
+            "program that stores frames",
+            *(tracked.ids or (0, 0)),
+            main.lag,
+            where,
+        )

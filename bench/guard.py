@@ -20,7 +20,7 @@ from mav_robot_status.clock import Instant, later
 from mav_robot_status.config import Config, LinkConfig
 from mav_robot_status.gateway.event_loop import EventLoop
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.mavlink.framing import Parser
 
 from . import workload

@@ -9,15 +9,15 @@ from mav_robot_status.clock import Instant
 from mav_robot_status.config.document import parse_document
 from mav_robot_status.config.reader import build
 from mav_robot_status.errors import ConfigError, UsageError
+from mav_robot_status.hardware.mavlink.faults import text_assembly
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.px4_events import ARMING_SUMMARY, HEALTH_SUMMARY
 from mav_robot_status.hardware.mavlink.px4_events.ids import CAUSE_AT
 from mav_robot_status.hardware.mavlink.px4_events.parsing import TableError
 from mav_robot_status.hardware.mavlink.px4_events.parsing import parse as parse_table
-from mav_robot_status.hardware.mavlink.state import text_assembly
-from mav_robot_status.hardware.mavlink.state.event_sequence import ASKABLE, KEPT
+from mav_robot_status.hardware.mavlink.px4_events.sequence import ASKABLE, KEPT
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.definitions import MESSAGES, CurrentEventSequence, Event, Heartbeat, Statustext
 from mav_robot_status.mavlink.encode import enclose, encode

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..config import Config
     from ..gateway.mavlink_hardware import MavlinkHardware
-    from ..hardware.mavlink.state.vehicle_state import VehicleState
+    from ..hardware.mavlink.state import VehicleState
 
 HEARD_BY: Final = 15.0  # s to wait for the first heartbeat
 KNOWN_BY: Final = 5.0

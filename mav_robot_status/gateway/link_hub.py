@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from ..config import Config
 from ..hardware.mavlink.belief import Belief
 from ..hardware.mavlink.identity import is_autopilot
-from ..hardware.mavlink.message_table import COMMAND_IDS
+from ..hardware.mavlink.subjects import COMMAND_IDS
 from ..interface import Audience
 from ..mavlink.commands import HEARTBEAT, ROBOT_STATUS, answer
 from ..mavlink.framing import Frame

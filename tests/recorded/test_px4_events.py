@@ -11,7 +11,7 @@ from mav_robot_status.gateway.recorded_log import Recording
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.px4_events import EventTable
 from mav_robot_status.hardware.mavlink.px4_events.parsing import parse
-from mav_robot_status.hardware.mavlink.rules.arming import can_arm
+from mav_robot_status.hardware.mavlink.readiness.rule import can_arm
 from mav_robot_status.mavlink.definitions import Event, SysStatus
 
 from .replays import HERE, SHARED

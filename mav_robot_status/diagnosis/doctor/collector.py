@@ -6,9 +6,9 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from ...gateway.observer import Observer
+from ...hardware.mavlink.estop.applet import is_word, value_of
 from ...hardware.mavlink.identity import is_autopilot
-from ...hardware.mavlink.state.applet import is_word, value_of
-from ...hardware.mavlink.state.high_latency import stated
+from ...hardware.mavlink.satellite.state import stated
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
 from ...mavlink.counters import count as add

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
+from ...hardware.mavlink.estop.applet import FRESH
 from ...hardware.mavlink.identity import named
 from ...hardware.mavlink.senders import LATE, Sender, Strangers
-from ...hardware.mavlink.state.applet import FRESH
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
 from ...values import NamedTuple

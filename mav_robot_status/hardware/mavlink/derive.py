@@ -7,24 +7,21 @@ motion_possible FALSE. I3 error_code != 0 <=> in_error TRUE. I4 link stale => ev
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...interface.fields import STATES
 from ...interface.status import Detail, Inhibit, LinkState, RobotMode, RobotStatus, Vehicle
 from ...mavlink.definitions import AUTOPILOT_NAMES, STATE_NAMES, TYPE_NAMES
-from ...values import NamedTuple
-from . import causes
+from .estop.rule import e_stopped
+from .faults import causes
+from .faults.rule import active_errors, in_error
+from .heartbeat.rule import flight_mode
 from .identity import named
-from .rules import high_latency
-from .rules.arming import can_arm
-from .rules.claimed import CLAIMED
-from .rules.drives_powered import drives_powered, motion_possible
-from .rules.e_stopped import e_stopped
-from .rules.errors import active_errors, in_error
-from .rules.flight_mode import flight_mode
-from .rules.in_motion import in_motion
-from .rules.inhibits import inhibit, inhibits
-from .rules.reason import TRUE, UNKNOWN, Reason, Source
+from .motion.rule import in_motion
+from .power import drives_powered, motion_possible
+from .readiness.rule import can_arm, inhibit, inhibits
+from .reason import CLAIMED, TRUE, UNKNOWN, Reason, Source
+from .satellite import rule as high_latency
 
 if TYPE_CHECKING:
     from ...clock import Instant

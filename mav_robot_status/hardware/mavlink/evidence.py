@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Final
 
 from ...interface.status import Evidence
 from ...mavlink.definitions import STATE_NAMES
-from .causes import EXTENDED_SENSOR, SENSOR
+from .estop import outputs
+from .faults.causes import EXTENDED_SENSOR, SENSOR
 from .identity import named, sensor_name
-from .rules.reason import Reason, Source
-from .state import outputs
-from .state.high_latency import speed
+from .reason import Reason, Source
+from .satellite.state import speed
 
 if TYPE_CHECKING:
     from .facts import Facts
-    from .state.latest_messages import Heard
-    from .state.vehicle_state import VehicleState
+    from .state import Heard, VehicleState
 
 Shown = tuple[str | None, float | None]
 """The deciding message with its field or text, and when it arrived (monotonic seconds)."""

@@ -19,25 +19,17 @@ from ...mavlink import definitions as mav
 from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
 from .autopilots.wanted import METADATA
 from .belief import Belief
+from .estop.applet import is_word
+from .estop.messages import overheard
 from .evidence import EvidenceOfVehicle
-from .handlers import overheard, transmitter_heard
-from .handlers.parts import TRANSMITTERS
+from .faults.messages import TRANSMITTERS, transmitter_heard
 from .identity import is_autopilot, named
-from .message_table import (
-    APPLET_ID,
-    ARM_STATUS_ID,
-    COMMAND_IDS,
-    EDGES,
-    FILE_IDS,
-    HEARTBEAT_ID,
-    HIGH_LATENCY_ID,
-)
 from .options import HardwareOptions
-from .places import Places
+from .readiness.rule import inhibit
 from .requests.scheduler import Ask, RequestScheduler
-from .rules.inhibits import inhibit
-from .state.applet import is_word
-from .state.high_latency import stated
+from .satellite.state import stated
+from .slots import VehicleSlots
+from .subjects import APPLET_ID, ARM_STATUS_ID, COMMAND_IDS, EDGES, FILE_IDS, HEARTBEAT_ID, HIGH_LATENCY_ID
 from .update import on_frame, status_at
 
 if TYPE_CHECKING:
@@ -48,7 +40,7 @@ if TYPE_CHECKING:
     from .derive import Derived
     from .facts import Facts
     from .px4_events import EventTable
-    from .state.vehicle_state import VehicleState
+    from .state import VehicleState
     from .vehicle import ExpectedVehicle, Names, TrackedVehicle
 
 log = logging.getLogger(__name__)
@@ -74,8 +66,8 @@ class MavlinkRobotHW(RobotHW):
         super().__init__()
         self.options = options or HardwareOptions()
         self._asking = RequestScheduler(self.options.watch_outputs, own_component, self.options.request_events)
-        self._places = Places(slots, self.handles, {} if beliefs is None else beliefs, names or {})
-        self._tracked = self._places.tracked
+        self._slots = VehicleSlots(slots, self.handles, {} if beliefs is None else beliefs, names or {})
+        self._tracked = self._slots.tracked
         self._due: DueTimes[TrackedVehicle] = DueTimes()
         """When the status of each vehicle may change. -inf: at once."""
         self.asks = False
@@ -95,7 +87,7 @@ class MavlinkRobotHW(RobotHW):
     @property
     def deadline(self) -> float:
         """When (monotonic seconds) `read` has work. -inf: at once."""
-        return min(self._due.first, self._places.expire_at)
+        return min(self._due.first, self._slots.expire_at)
 
     @property
     def vehicles(self) -> Iterator[TrackedVehicle]:
@@ -194,7 +186,7 @@ class MavlinkRobotHW(RobotHW):
         """Update the handles to `now`."""
         if self._unheard:
             self._report_unheard(now)
-        if now.mono >= self._places.expire_at and (gone := self._places.expired(now.mono, self.options)):
+        if now.mono >= self._slots.expire_at and (gone := self._slots.expired(now.mono, self.options)):
             self._remove(gone)
         while self._due.first <= now.mono:
             self._update(self._due.first_key(), now)
@@ -247,9 +239,9 @@ class MavlinkRobotHW(RobotHW):
 
         Statuses do not change until the next `read`.
         """
-        self._places.expire_at = -math.inf
+        self._slots.expire_at = -math.inf
         for ids, theirs in other._tracked.items():
-            tracked = None if theirs.state is None else self._places.place(ids, theirs.belief)
+            tracked = None if theirs.state is None else self._slots.place(ids, theirs.belief)
             if tracked is None:
                 continue
             ours = tracked.handle
@@ -276,7 +268,7 @@ class MavlinkRobotHW(RobotHW):
     def _report_unheard(self, now: Instant) -> None:
         """Once: set LINK_STALE for each expected vehicle that sent nothing."""
         self._unheard = False
-        for tracked in self._places.expected:
+        for tracked in self._slots.expected:
             if tracked.state is None:
                 unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
                 tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
@@ -310,10 +302,10 @@ class MavlinkRobotHW(RobotHW):
 
     def _discover(self, ids: tuple[int, int], heartbeat: mav.Heartbeat, now: Instant) -> TrackedVehicle | None:
         """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
-        gone = self._places.room_for(ids, now.mono, self.options)
+        gone = self._slots.room_for(ids, now.mono, self.options)
         if gone:
             self._remove(gone)
-        tracked = (None if gone is None else self._places.place(ids)) or self._succeed(ids)
+        tracked = (None if gone is None else self._slots.place(ids)) or self._succeed(ids)
         if tracked is None:
             self.ignored += 1
             return None
@@ -328,7 +320,7 @@ class MavlinkRobotHW(RobotHW):
         for tracked in gone:
             if tracked.ids is not None:
                 self._event_tables.pop(tracked.ids, None)
-            self._places.remove(tracked)
+            self._slots.remove(tracked)
             self._due.set(tracked, math.inf)
         self._unheard = self.changed = True
 
@@ -340,7 +332,7 @@ class MavlinkRobotHW(RobotHW):
         """
         if ids[1] != MAV_COMP_ID_AUTOPILOT1:
             return None
-        for tracked in self._places.expected:
+        for tracked in self._slots.expected:
             owner = tracked.ids
             if owner is None or tracked.slot.component is not None or owner[0] != ids[0] or _is_armed(tracked):
                 continue
@@ -348,7 +340,7 @@ class MavlinkRobotHW(RobotHW):
             tracked.forget()
             self._due.set(tracked, math.inf)
             tracked.requests = tracked.parameters = None
-            self._places.give(tracked, ids)
+            self._slots.give(tracked, ids)
             return tracked
         return None
 
@@ -425,7 +417,7 @@ class MavlinkRobotHW(RobotHW):
         ids = tracked.ids or (0, 0)
         if state is LinkState.LOST and before is LinkState.CONNECTED:
             tracked.losses += 1
-            self._places.lost(tracked, self.options)
+            self._slots.lost(tracked, self.options)
             log.warning("lost vehicle %d.%d: nothing for %g s", *ids, tracked.timeout(self.options))
         elif state is LinkState.CONNECTED and before is LinkState.LOST:
             log.info("vehicle %d.%d is back", *ids)

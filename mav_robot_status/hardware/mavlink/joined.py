@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 from ...interface.status import Inhibit, RobotMode, TriState
 from ..join import Logic, join
-from .rules.inhibits import inhibit
-from .rules.reason import Reason, Source
+from .readiness.rule import inhibit
+from .reason import Reason, Source
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,8 +7,8 @@ interface go back to the model. Every status is checked against the invariants.
 from __future__ import annotations
 
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.hardware.mavlink.vehicle import TrackedVehicle
 from mav_robot_status.interface import Detail, RobotMode, RobotStatus, TriState
 from mav_robot_status.mavlink.encode import encode

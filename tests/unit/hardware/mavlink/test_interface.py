@@ -8,7 +8,7 @@ import pytest
 
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.places import MOST_PASSING, MOST_VEHICLES
+from mav_robot_status.hardware.mavlink.slots import MOST_PASSING, MOST_VEHICLES
 from mav_robot_status.hardware.mavlink.vehicle import ESTABLISHED, ExpectedVehicle
 from mav_robot_status.interface import LinkState, RobotStatus, TriState, Vehicle
 from mav_robot_status.mavlink import definitions as mav

@@ -9,8 +9,7 @@ from typing import Any, Final
 
 import pytest
 
-from mav_robot_status.hardware.mavlink.handlers import HANDLERS
-from mav_robot_status.hardware.mavlink.message_table import EDGES, WANTED_IDS
+from mav_robot_status.hardware.mavlink.subjects import EDGES, HANDLERS, WANTED_IDS
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink import definitions as mav
 

@@ -1,0 +1,244 @@
+"""e_stopped: whether an emergency stop is engaged. The profile names the indications of a stop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from ....interface.status import TriState
+from ....mavlink.enumerations import MAV_STATE_FLIGHT_TERMINATION
+from ..autopilots.profile import EmergencyStop
+from ..facts import Applet, Outputs, Stop
+from ..faults.causes import TERMINATION_ANNOUNCED
+from ..heartbeat.rule import is_simulated
+from ..identity import PLANE
+from ..motion.estimate import hud_speeds
+from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
+from ..state import FRESH, honours_stop, vtol_state
+from . import applet as applets
+from . import outputs
+from . import state as estop
+
+if TYPE_CHECKING:
+    from ....interface.status import TriState
+    from ..facts import Deadline, Facts
+    from ..options import HardwareOptions
+    from ..state import VehicleState
+
+ASSUMED: Final = Reason("not stopped when armed, and no text since (estop_assume_visible)")
+APPLET: Final = Reason("the applet on the autopilot says so", Source.APPLET)
+SAID: Final = Reason("the autopilot said so", Source.STOP)
+NOT_WATCHED: Final = Reason("the outputs are not watched")
+
+
+def e_stopped(facts: Facts, options: HardwareOptions) -> Finding:
+    """Whether an emergency stop is engaged."""
+    found = RULES[facts.kind.profile.stops.shown_by](facts, options)
+    if found[0] is UNKNOWN and not found[1].doubt and options.estop_unknown_as == "false":
+        return FALSE, Reason("estop_unknown_as: false")
+    return found
+
+
+def _by_state(facts: Facts, options: HardwareOptions) -> Finding:
+    """PX4. Before `shown_from` its state does not show a stop; only texts do."""
+    if facts.heartbeat.system_status == MAV_STATE_FLIGHT_TERMINATION:
+        if is_simulated(facts):
+            return UNKNOWN, Reason("in hardware-in-the-loop older PX4 is always in lockdown", Source.STATE)
+        return TRUE, Reason("state FLIGHT_TERMINATION: kill, lockdown or termination", Source.STATE)
+    said, version, shown_from = facts.stop.said, facts.kind.firmware, facts.kind.profile.stops.shown_from
+    shows_all = version is not None and shown_from is not None and version >= shown_from
+    if said is TRUE:
+        if shows_all:
+            return UNKNOWN, Reason(
+                "a text reports a stop, and no heartbeat has shown the state since", Source.STOP, doubt=True
+            )
+        return TRUE, SAID
+    if facts.stop.doubt is not None and not shows_all:
+        return UNKNOWN, _doubt(facts.stop.doubt)
+    if version is None or shows_all:
+        return FALSE, Reason("PX4 shows every stop as state FLIGHT_TERMINATION", Source.STATE)
+    if said is FALSE:
+        return FALSE, SAID
+    if _is_assumed_free(facts, options):
+        return FALSE, ASSUMED
+    return UNKNOWN, Reason("PX4 before 1.12 shows a kill only in texts", Source.VERSION)
+
+
+def _deduced(facts: Facts, options: HardwareOptions) -> Finding:
+    """ArduPilot: a stop changes neither HEARTBEAT nor, while armed, SYS_STATUS. Without evidence: UNKNOWN."""
+    if _is_terminated(facts):
+        return TRUE, Reason("termination announced", Source.LATCH, TERMINATION_ANNOUNCED)
+    if facts.heartbeat.system_status == MAV_STATE_FLIGHT_TERMINATION:
+        return TRUE, Reason("state FLIGHT_TERMINATION", Source.STATE)
+    applet = facts.applet
+    if applet.stopped is not UNKNOWN:
+        if applet.is_contradicted:
+            rule = "the applet on the autopilot reports a stop, but a motor output is off its stop value"
+            return UNKNOWN, Reason(rule, Source.APPLET_AND_OUTPUTS, doubt=True)
+        return applet.stopped, APPLET
+    if facts.fresh.sys_status and facts.sys_status.safety_switch:
+        return TRUE, Reason("safety switch engaged", Source.SAFETY_SWITCH)
+    if facts.stop.said is TRUE:
+        return TRUE, SAID
+    watched, why = _watched(facts, options)
+    if watched is TRUE:
+        return TRUE, why
+    doubt = _doubted(facts)
+    if doubt is not None:
+        return UNKNOWN, doubt
+    found = _released(facts, options, watched, why)
+    if facts.stop_switch and found[0] is FALSE:
+        # reversed channels and MAV_CMD_DO_AUX_FUNCTION can differ from the switch, so it does not prove a stop
+        rule = "a switch of option 31 is in its stop position"
+        return UNKNOWN, Reason(rule, Source.RC_CHANNELS, doubt=watched is not FALSE)
+    return found
+
+
+def _doubted(facts: Facts) -> Reason | None:
+    """Why a stop may last, although there is no evidence of it any more."""
+    if facts.sys_status.switch_outdated:
+        rule = "the safety switch was engaged, and may have been released since"
+        return Reason(rule, Source.SAFETY_SWITCH, doubt=True)
+    return None if facts.stop.doubt is None else _doubt(facts.stop.doubt)
+
+
+def _doubt(rule: str) -> Reason:
+    return Reason(rule, Source.STOP, doubt=True)
+
+
+def _released(facts: Facts, options: HardwareOptions, watched: TriState, why: Reason) -> Finding:
+    """FALSE if there is evidence that no stop is engaged. `watched` and its reason `why` are what the outputs show."""
+    if not facts.armed and facts.fresh.sys_status and facts.stop.is_ready:
+        if facts.stop_excused:
+            excused = "the pre-arm checks pass, but do not fail on a stop by the switch of option 165"
+            return UNKNOWN, Reason(excused, Source.SWITCHES)
+        return FALSE, Reason("the pre-arm checks, which include the stop, pass", Source.PREARM_CHECK)
+    if facts.stop.said is FALSE:
+        return FALSE, SAID
+    if watched is FALSE:
+        return FALSE, why
+    if _is_assumed_free(facts, options):
+        return FALSE, ASSUMED
+    return UNKNOWN, Reason("ArduPilot does not show an emergency stop in HEARTBEAT, SYS_STATUS or texts alone")
+
+
+def _termination_only(facts: Facts, options: HardwareOptions) -> Finding:
+    if facts.heartbeat.system_status == MAV_STATE_FLIGHT_TERMINATION:
+        return TRUE, Reason("state FLIGHT_TERMINATION", Source.STATE)
+    return UNKNOWN, Reason("this autopilot does not show emergency stops")
+
+
+RULES: Final[dict[EmergencyStop, Callable[[Facts, HardwareOptions], Finding]]] = {
+    EmergencyStop.STATE: _by_state,
+    EmergencyStop.DEDUCED: _deduced,
+    EmergencyStop.TERMINATION_ONLY: _termination_only,
+}
+assert set(RULES) == set(EmergencyStop)
+
+
+def _is_terminated(facts: Facts) -> bool:
+    """Whether a termination was announced that is not a landing under power."""
+    announced = any(cause.code == TERMINATION_ANNOUNCED for cause in facts.latched.causes)
+    return announced and not facts.latched.termination_outlived
+
+
+def _is_assumed_free(facts: Facts, options: HardwareOptions) -> bool:
+    """Whether no stop was engaged at arming, at a site where every later stop would have been reported."""
+    return facts.armed and options.estop_assume_visible and facts.assumed_free
+
+
+def _watched(facts: Facts, options: HardwareOptions) -> Finding:
+    """The output watch and ESC telemetry of an armed vehicle."""
+    outputs = facts.outputs
+    if not facts.armed or not options.watch_outputs:
+        return UNKNOWN, NOT_WATCHED
+    if facts.esc_turning:
+        # recorded: a plane's propeller keeps turning after a stop; the wheels of a coasting rover turn its motors
+        if facts.kind.family is not PLANE and not (outputs.fresh and outputs.at_stop):
+            return FALSE, Reason("a motor turns", Source.ESC)
+        if not (outputs.fresh and outputs.driven):
+            return UNKNOWN, Reason("a motor turns, perhaps without being driven", Source.ESC)
+    if not outputs.fresh:
+        return UNKNOWN, Reason("no fresh SERVO_OUTPUT_RAW")
+    if outputs.driven:
+        return FALSE, Reason("a motor output is off its stop value", Source.OUTPUTS)
+    if outputs.held and not facts.outputs_vetoed:
+        return TRUE, Reason("motor outputs held at their stop value while throttle is demanded", Source.OUTPUTS)
+    return UNKNOWN, Reason("the outputs neither drive nor are held", Source.OUTPUTS)
+
+
+NO_OUTPUTS: Final = Outputs(False, False, False, False)
+NOTHING_SAID: Final = Stop(UNKNOWN, None, False, None)
+NO_APPLET: Final = Applet(UNKNOWN, False, False)
+
+
+def motor_outputs(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Outputs:
+    """The state of the motor outputs of an armed vehicle."""
+    watch = state.watch
+    if watch.at is None or not state.heartbeats.armed:
+        return NO_OUTPUTS
+    held = watch.held and outputs.proves_stop(state.family, state.vehicle_type, vtol_state(state))
+    at_stop = state.latest.esc is not None and outputs.is_at_stop(watch, state.vehicle_type)
+    return Outputs(deadline.is_within(watch.at + FRESH), watch.driven, held, at_stop)
+
+
+def outputs_vetoed(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
+    """Whether a motion shows that the vehicle is driven although the outputs seem held."""
+    watch = state.watch
+    if watch.held_since is None:
+        return False
+    speed, climb = hud_speeds(state.latest)
+    turning = state.turning if deadline.is_fresh(state.latest.attitude, FRESH) else math.inf
+    return outputs.is_vetoed(watch, state.family, state.vehicle_type, speed, climb, turning)
+
+
+def esc_turning(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
+    """Whether ESC telemetry shows a motor that turns."""
+    return deadline.is_fresh(state.latest.esc, FRESH)
+
+
+def stop(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Stop:
+    """What the autopilot has reported about an emergency stop."""
+    said, word, doubt = state.stop, state.applet, state.stop.doubt
+    if (
+        word is not None
+        and applets.stops(word, honours_stop(state))
+        and not deadline.is_within(word.at + applets.FRESH)
+    ):
+        doubt = doubt or estop.APPLET_SILENT
+    elif said is estop.NOTHING:
+        return NOTHING_SAID
+    is_over = said.repeats and deadline.has_come(said.last + estop.REPEATED)
+    if said.lost_at is not None and deadline.has_come(said.lost_at + estop.OUTLASTS_LOSS):
+        is_over = True
+        doubt = doubt or (estop.FRAMES_LOST if said.said is TRUE else None)
+    value = UNKNOWN if is_over else said.said
+    return Stop(value, said.text, said.ready >= estop.READY_MESSAGES, doubt)
+
+
+def applet(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Applet:
+    """The word of the applet on the autopilot."""
+    word = state.applet
+    if word is None or not deadline.is_within(word.at + applets.FRESH):
+        return NO_APPLET
+    if not applets.stops(word, honours_stop(state)):
+        return Applet(UNKNOWN if word.value else FALSE, False, True)
+    since, watched_at = word.driven_since, state.watch.at
+    driven = since is not None and watched_at is not None and deadline.is_within(watched_at + FRESH)
+    return Applet(TRUE, driven and deadline.has_come((since or 0.0) + applets.CONTRADICTED), True)
+
+
+def stop_switch(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
+    """Whether an RC switch that stops the motors is in its stop position."""
+    return deadline.is_within(state.stop_switch_at + FRESH)
+
+
+def stop_excused(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
+    """Whether a switch exists whose stop the pre-arm checks ignore."""
+    return estop.is_excused(state.switches)
+
+
+def assumed_free(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
+    """Whether no stop was engaged when it was armed."""
+    return state.assumed_free

@@ -16,6 +16,7 @@ from .estop import state as estop
 from .facts import UNDISPUTED, Claimed, Deadline
 from .faults.texts import pass_time
 from .heartbeat.messages import exchanged, rebooted, starts_anew
+from .heartbeat.state import missed
 from .identity import is_autopilot
 from .joined import joined
 from .motion import state as motion
@@ -81,10 +82,14 @@ def _arrived(tracked: TrackedVehicle, speaker: Speaker, message: Any, at: float,
     if state is None:
         return
     is_heartbeat = type(message) is Heartbeat and is_autopilot(message, tracked.component)
-    if is_heartbeat or at - state.arrived <= timeout_of(state, options):
+    timeout, beat = timeout_of(state, options), state.latest.heartbeat
+    if is_heartbeat or at - state.arrived <= timeout:
         state.arrived = max(at, state.arrived)
+        if beat is not None and speaker.said_at - beat.at > timeout:
+            state.heartbeats = missed(state.heartbeats, at)
     if speaker.lost_since is not None:
         state.stop = estop.lost(state.stop, speaker.lost_since)
+        state.note_loss(speaker.lost_since)
         speaker.lost_since = None
 
 

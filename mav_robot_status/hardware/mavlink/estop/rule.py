@@ -113,6 +113,8 @@ def _released(facts: Facts, options: HardwareOptions, watched: TriState, why: Re
         if facts.stop_excused:
             excused = "the pre-arm checks pass, but do not fail on a stop by the switch of option 165"
             return UNKNOWN, Reason(excused, Source.SWITCHES)
+        if facts.stop.unexplained:  # a termination disarms, and no check fails on it
+            return UNKNOWN, Reason("it was disarmed in motion, and frames that may tell why are lost", Source.STOP)
         return FALSE, Reason("the pre-arm checks, which include the stop, pass", Source.PREARM_CHECK)
     if facts.stop.said is FALSE:
         return FALSE, SAID
@@ -120,6 +122,9 @@ def _released(facts: Facts, options: HardwareOptions, watched: TriState, why: Re
         return FALSE, why
     if _is_assumed_free(facts, options):
         return FALSE, ASSUMED
+    if facts.outputs.fresh and facts.outputs.idle:
+        rule = "the outputs stand at their stop value while throttle is demanded, and may be motors"
+        return UNKNOWN, Reason(rule, Source.OUTPUTS, doubt=True)
     return UNKNOWN, Reason("ArduPilot does not show an emergency stop in HEARTBEAT, SYS_STATUS or texts alone")
 
 
@@ -168,8 +173,8 @@ def _watched(facts: Facts, options: HardwareOptions) -> Finding:
     return UNKNOWN, Reason("the outputs neither drive nor are held", Source.OUTPUTS)
 
 
-NO_OUTPUTS: Final = Outputs(False, False, False, False)
-NOTHING_SAID: Final = Stop(UNKNOWN, None, False, None)
+NO_OUTPUTS: Final = Outputs(False, False, False, False, False)
+NOTHING_SAID: Final = Stop(UNKNOWN, None, False, None, False)
 NO_APPLET: Final = Applet(UNKNOWN, False, False)
 
 
@@ -178,9 +183,10 @@ def motor_outputs(state: VehicleState, deadline: Deadline, options: HardwareOpti
     watch = state.watch
     if watch.at is None or not state.heartbeats.armed:
         return NO_OUTPUTS
-    held = watch.held and outputs.proves_stop(state.family, state.vehicle_type, vtol_state(state))
+    proves = outputs.proves_stop(state.family, state.vehicle_type, vtol_state(state))
     at_stop = state.latest.esc is not None and outputs.is_at_stop(watch, state.vehicle_type)
-    return Outputs(deadline.is_within(watch.at + FRESH), watch.driven, held, at_stop)
+    fresh = deadline.is_within(watch.at + FRESH)
+    return Outputs(fresh, watch.driven, watch.held and proves, at_stop, watch.idle and proves)
 
 
 def outputs_vetoed(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
@@ -207,14 +213,14 @@ def stop(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> S
         and not deadline.is_within(word.at + applets.FRESH)
     ):
         doubt = doubt or estop.APPLET_SILENT
-    elif said is estop.NOTHING:
+    elif said is estop.NOTHING and not state.unexplained:
         return NOTHING_SAID
     is_over = said.repeats and deadline.has_come(said.last + estop.REPEATED)
     if said.lost_at is not None and deadline.has_come(said.lost_at + estop.OUTLASTS_LOSS):
         is_over = True
         doubt = doubt or (estop.FRAMES_LOST if said.said is TRUE else None)
     value = UNKNOWN if is_over else said.said
-    return Stop(value, said.text, said.ready >= estop.READY_MESSAGES, doubt)
+    return Stop(value, said.text, said.ready >= estop.READY_MESSAGES, doubt, state.unexplained)
 
 
 def applet(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Applet:

@@ -16,6 +16,7 @@ from ..estop import state as estop
 from ..estop.messages import look_again
 from ..faults import causes, latches, sensors
 from ..faults.texts import pass_time
+from ..identity import Family
 from ..motion.state import Motion
 from ..px4_events import sequence as event_sequence
 from ..readiness import arming_report
@@ -35,6 +36,8 @@ LONG_LOSS: Final = 30.0
 """Seconds of link loss after which all latched state is invalid."""
 LONGEST_START: Final = 10.0
 """Seconds from the first heartbeat to the text that ends the start."""
+FLIES: Final = frozenset({Family.COPTER, Family.PLANE})
+"""An autopilot does not disarm these in motion, but for a crash, a termination or a forced disarm."""
 TICKS: Final = 1.5
 """Seconds within which a clock counts as running."""
 
@@ -59,9 +62,8 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
     seen = state.latest
     previous: Heartbeat = seen.heartbeat.message if seen.heartbeat else message
     seen.heartbeat = heard(message, now.mono, seen.heartbeat)
-    if message != previous:
-        if starts_anew(previous, message, state):
-            rebooted(state, now.mono, now)
+    if message != previous and starts_anew(previous, message, state):
+        rebooted(state, now.mono, now)
     if state.started_at is not None:
         started, state.started_at = state.started_at, None
         if _is_another_run(state, started):
@@ -77,6 +79,11 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         state.arming = arming_report.NOTHING  # a newer one may be lost
     if before.armed and not heartbeats.armed and now.mono - last < SUDDEN:
         state.told_armed = now.mono + 1e-6
+    if before.armed and not heartbeats.armed and state.motion.value is TriState.TRUE and state.family in FLIES:
+        state.disarmed_at = now.mono
+        state.note_loss(state.lost_at)
+    elif heartbeats.armed:
+        state.disarmed_at, state.unexplained = None, False
     if heartbeats.armed and not (before.armed and connected):
         state.armed_after = seen.sys_status.message if seen.sys_status is not None else None
     if not connected or (before.armed and not heartbeats.armed):

@@ -21,11 +21,11 @@ from .autopilots.wanted import METADATA
 from .belief import Belief
 from .estop.applet import is_word
 from .estop.messages import overheard
-from .evidence import EvidenceOfVehicle
 from .faults.messages import TRANSMITTERS, transmitter_heard
 from .identity import is_autopilot, named
 from .options import HardwareOptions
 from .readiness.rule import inhibit
+from .reason import EvidenceOfVehicle
 from .requests.scheduler import Ask, RequestScheduler
 from .satellite.state import stated
 from .slots import VehicleSlots

@@ -1,61 +1,82 @@
-"""The reason of a rule for the value of a field. `evidence` renders it as text."""
+"""Why a field has its value: the rule that decided, and the evidence for it in words.
+
+The words are made on request, by a function that stands beside the rule: a rule reads facts, and the underlying numbers
+and times of arrival are in the state.
+"""
 
 from __future__ import annotations
 
-from enum import Enum
-from typing import Final, NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ...interface.status import TriState
+from ...interface.status import Evidence, TriState
+
+if TYPE_CHECKING:
+    from .facts import Facts
+    from .state import Heard, VehicleState
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 
+Shown = tuple[str | None, float | None]
+"""The deciding message with its field or text, and when it arrived (monotonic seconds)."""
+Words = Callable[["VehicleState", "Facts", "Reason"], Shown]
 
-class Source(Enum):
-    """What a rule decided on."""
 
-    NONE = "nothing"
-    HEARTBEAT = "HEARTBEAT"
-    BASE_MODE = "HEARTBEAT.base_mode"
-    CUSTOM_MODE = "HEARTBEAT.custom_mode"
-    MODE_NUMBER = "HEARTBEAT.custom_mode with its number"
-    STATE = "HEARTBEAT.system_status"
-    STATE_AND_RC = "HEARTBEAT.system_status, and RC_RECEIVER in SYS_STATUS"
-    SYS_STATUS = "SYS_STATUS"
-    SAFETY_SWITCH = "MOTOR_OUTPUTS in SYS_STATUS"
-    PREARM_CHECK = "PREARM_CHECK in SYS_STATUS"
-    INTERNAL_ERRORS = "errors_count in SYS_STATUS"
-    SENSOR = "a bit in SYS_STATUS"
-    VERSION = "the version of the firmware"
-    SWITCHES = "RCn_OPTION"
-    STOP = "what was said of an emergency stop"
-    APPLET = "RS_STOP"
-    APPLET_AND_OUTPUTS = "RS_STOP against SERVO_OUTPUT_RAW"
-    RC_CHANNELS = "RC_CHANNELS, with RCn_OPTION"
-    LATCH = "what announced a cause"
-    PARTS = "what faulty parts reported"
-    CLAIMS = "what the senders with these ids say"
-    ESC = "ESC telemetry"
-    OUTPUTS = "SERVO_OUTPUT_RAW"
-    LANDED_STATE = "EXTENDED_SYS_STATE"
-    LANDED_NUMBER = "EXTENDED_SYS_STATE with its number"
-    VELOCITY = "the message that gives the speed"
-    GPS = "GPS_RAW_INT"
-    ATTITUDE = "ATTITUDE"
-    HIGH_LATENCY = "HIGH_LATENCY2"
+def nothing(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """No message decided."""
+    return None, None
+
+
+def claims_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """What the senders with these ids say."""
+    return "the HEARTBEATs of several senders", None
+
+
+def at(heard: Heard | None) -> float | None:
+    """When a message arrived, if it did."""
+    return None if heard is None else heard.at
+
+
+def words(text: str, kind: str) -> Words:
+    """Words on the latest message of a kind in `LatestMessages`; `text` may name facts: `{facts.landed_state}`."""
+
+    def shown(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+        return text.format(facts=facts, state=state), at(getattr(state.latest, kind))
+
+    return shown
 
 
 class Reason(NamedTuple):
-    """The rule that decided, and its source."""
+    """The rule that decided, and what it decided on."""
 
     rule: str
-    source: Source = Source.NONE
+    words: Words = nothing
     code: int = 0
-    """The code of the cause, if the source is a cause."""
+    """The code of the cause, if it decided on a cause."""
     doubt: bool = False
     """Of an unknown e_stopped: whether there is evidence of a stop, so that the drives may have no power."""
 
 
 Finding = tuple[TriState, Reason]
 
-CLAIMED: Final = Reason("another sender claims the ids of this vehicle", Source.CLAIMS)
+CLAIMED: Final = Reason("another sender claims the ids of this vehicle", claims_words)
 """Two vehicles use the ids and cannot be told apart: nothing is known."""
+
+
+class EvidenceOfVehicle(Mapping[str, Evidence]):
+    """The evidence for each field of a status, made when it is read, with the numbers of that time."""
+
+    __slots__ = ("_facts", "_reasons", "_state")
+
+    def __init__(self, state: VehicleState, facts: Facts, reasons: Mapping[str, Reason]) -> None:
+        self._state, self._facts, self._reasons = state, facts, reasons
+
+    def __getitem__(self, field: str) -> Evidence:
+        reason = self._reasons[field]
+        return Evidence(reason.rule, *reason.words(self._state, self._facts, reason))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._reasons)
+
+    def __len__(self) -> int:
+        return len(self._reasons)

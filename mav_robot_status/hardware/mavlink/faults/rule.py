@@ -8,8 +8,10 @@ from ....interface.status import ErrorCause
 from ....mavlink.enumerations import MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
 from ..autopilots.sensor_weights import SOFT
 from ..facts import Cause, Latched, NotReady, Parts, SensorFault, SystemStatus
-from ..heartbeat.rule import is_simulated
-from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
+from ..heartbeat.rule import UNEXPLAINED, is_simulated, state_words
+from ..identity import sensor_name
+from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason, at, claims_words, words
+from ..satellite.rule import high_latency_words
 from ..state import FRESH
 from . import causes, latches, parts, sensors, text_assembly
 
@@ -18,90 +20,10 @@ if TYPE_CHECKING:
 
     from ..facts import Deadline, Facts
     from ..options import HardwareOptions
+    from ..reason import Reason, Shown, Words
     from ..state import VehicleState
 
-
-class Error(NamedTuple):
-    """An active cause with its priority and its source."""
-
-    cause: ErrorCause
-    priority: int
-    source: Source
-
-
-def active_errors(facts: Facts) -> list[Error]:
-    """Every active cause, the most important first."""
-    every = (*_of_parts(facts), *_announced(facts), *_counted(facts), *_faulty(facts))
-    found = {error.cause.code: error for error in every}
-    for error in _of_state(facts, found.keys()):
-        found.setdefault(error.cause.code, error)
-    return sorted(found.values(), key=lambda error: error.priority)
-
-
-def _error(code: int, text: str | None, since_us: int, source: Source, later: int = 0) -> Error:
-    return Error(causes.error(code, text, since_us), causes.CAUSES[code].priority + later, source)
-
-
-def _announced(facts: Facts) -> Iterator[Error]:
-    if facts.claimed.conflict_since is not None:
-        yield _error(causes.SYSTEM_ID_CONFLICT, None, facts.claimed.conflict_since, Source.CLAIMS)
-    for code, text, since_us in facts.latched.causes:
-        yield _error(code, text, since_us, Source.LATCH)
-    if facts.seldom is not None:
-        for code, text, since_us in facts.seldom.failures:
-            yield _error(code, text, since_us, Source.HIGH_LATENCY)
-
-
-def _of_parts(facts: Facts) -> Iterator[Error]:
-    """The causes that parts report. The autopilot's own text about the same cause is preferred."""
-    for code, text, since_us in facts.parts.faults:
-        yield _error(code, text, since_us, Source.PARTS)
-
-
-def _counted(facts: Facts) -> Iterator[Error]:
-    since = facts.sys_status.internal_errors_since
-    if since is not None and facts.fresh.sys_status:
-        yield _error(causes.INTERNAL_ERROR, None, since, Source.INTERNAL_ERRORS)
-
-
-def _faulty(facts: Facts) -> Iterator[Error]:
-    if not facts.fresh.sys_status:
-        return
-    for bit, is_soft, since_us in facts.faults:
-        later = causes.SOFT_AFTER if is_soft else 0
-        yield _error(causes.of_sensor(bit), None, since_us, Source.SENSOR, later)
-
-
-def _of_state(facts: Facts, found: Collection[int]) -> Iterator[Error]:
-    """The causes from HEARTBEAT.system_status, unless a specific cause is active."""
-    state, words, since = facts.heartbeat.system_status, facts.explained.failsafe, facts.state_since
-    if state == MAV_STATE_FLIGHT_TERMINATION and not is_simulated(facts):
-        yield _error(causes.FLIGHT_TERMINATION, words, since, Source.STATE)
-    if state == MAV_STATE_EMERGENCY and not causes.NAMED_EMERGENCIES.intersection(found):
-        crashed = facts.kind.family in facts.kind.profile.states.emergency_is_crash
-        yield _error(causes.CRASH if crashed else causes.EMERGENCY, words, since, Source.STATE)
-    if state == MAV_STATE_CRITICAL and not causes.NAMED_FAILSAFES.intersection(found):
-        if facts.sys_status.rc_lost_with_state:
-            yield _error(causes.RC_LOST, words, since, Source.STATE_AND_RC)
-        elif not facts.latched.failsafe_over:
-            yield _error(causes.FAILSAFE, words, since, Source.STATE)
-
-
-CONSTANT: Final = Reason("the SYS_STATUS of this autopilot never changes", Source.SYS_STATUS)
-
-
-def in_error(facts: Facts, errors: list[Error]) -> Finding:
-    """TRUE with any cause; FALSE only with a fresh SYS_STATUS, which would show a cause."""
-    if errors:
-        first = errors[0]
-        return TRUE, Reason(f"{first.cause.code} {first.cause.name}", first.source, first.cause.code)
-    if not facts.fresh.sys_status:
-        return UNKNOWN, Reason("no fresh SYS_STATUS")
-    if not facts.kind.profile.sensors.are_monitored:
-        return UNKNOWN, CONSTANT
-    if facts.stop.unexplained and not facts.armed:  # a crash or a termination disarms, and a text alone says so
-        return UNKNOWN, Reason("it was disarmed in motion, and frames that may tell why are lost", Source.STOP)
-    return FALSE, Reason("no cause is active", Source.SYS_STATUS)
+# -- facts -------------------------------------------------------------------------------------------------------------
 
 
 TOGETHER: Final = 5.0
@@ -180,3 +102,129 @@ def _joined(code: int, faults: list[tuple[int, parts.Fault]]) -> Cause:
 def text_overdue(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
     """Whether the missing chunks of a text are overdue."""
     return any(deadline.has_come(partial.at + text_assembly.PATIENCE) for _, partial in state.texts)
+
+
+# -- evidence in words -------------------------------------------------------------------------------------------------
+
+
+sys_status_words: Final = words("SYS_STATUS", "sys_status")
+
+
+def state_and_rc_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """The state, and why it is a lost remote control."""
+    text, heard_at = state_words(state, facts, reason)
+    return f"{text}, as SYS_STATUS: RC_RECEIVER turned unhealthy", heard_at
+
+
+def internal_errors_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """The mask of internal errors."""
+    heard = state.latest.sys_status
+    count = 0 if heard is None else heard.message.errors_count1 | heard.message.errors_count2 << 16
+    return f"SYS_STATUS.errors_count 0x{count:x}", at(heard)
+
+
+def sensor_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """The bit by its name."""
+    bit = reason.code - causes.SENSOR
+    if reason.code >= causes.EXTENDED_SENSOR:
+        bit = reason.code - causes.EXTENDED_SENSOR + 32
+    return f"SYS_STATUS: {sensor_name(bit)} enabled, unhealthy", at(state.latest.sys_status)
+
+
+def latch_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """What announced the cause."""
+    latch = state.latches.get(reason.code)
+    return (None, None) if latch is None else (latch.source, latch.last)
+
+
+def parts_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """What the part said last."""
+    reported = [fault for (_, code), fault in state.faulty_parts.items() if code == reason.code]
+    latest = max(reported, key=lambda fault: fault.last, default=None)
+    return (None, None) if latest is None else (latest.source, latest.last)
+
+
+# -- the rule ----------------------------------------------------------------------------------------------------------
+
+
+class Error(NamedTuple):
+    """An active cause with its priority, and what it rests on in words."""
+
+    cause: ErrorCause
+    priority: int
+    words: Words
+
+
+def active_errors(facts: Facts) -> list[Error]:
+    """Every active cause, the most important first."""
+    every = (*_of_parts(facts), *_announced(facts), *_counted(facts), *_faulty(facts))
+    found = {error.cause.code: error for error in every}
+    for error in _of_state(facts, found.keys()):
+        found.setdefault(error.cause.code, error)
+    return sorted(found.values(), key=lambda error: error.priority)
+
+
+def _error(code: int, text: str | None, since_us: int, words: Words, later: int = 0) -> Error:
+    return Error(causes.error(code, text, since_us), causes.CAUSES[code].priority + later, words)
+
+
+def _announced(facts: Facts) -> Iterator[Error]:
+    if facts.claimed.conflict_since is not None:
+        yield _error(causes.SYSTEM_ID_CONFLICT, None, facts.claimed.conflict_since, claims_words)
+    for code, text, since_us in facts.latched.causes:
+        yield _error(code, text, since_us, latch_words)
+    if facts.seldom is not None:
+        for code, text, since_us in facts.seldom.failures:
+            yield _error(code, text, since_us, high_latency_words)
+
+
+def _of_parts(facts: Facts) -> Iterator[Error]:
+    """The causes that parts report. The autopilot's own text about the same cause is preferred."""
+    for code, text, since_us in facts.parts.faults:
+        yield _error(code, text, since_us, parts_words)
+
+
+def _counted(facts: Facts) -> Iterator[Error]:
+    since = facts.sys_status.internal_errors_since
+    if since is not None and facts.fresh.sys_status:
+        yield _error(causes.INTERNAL_ERROR, None, since, internal_errors_words)
+
+
+def _faulty(facts: Facts) -> Iterator[Error]:
+    if not facts.fresh.sys_status:
+        return
+    for bit, is_soft, since_us in facts.faults:
+        later = causes.SOFT_AFTER if is_soft else 0
+        yield _error(causes.of_sensor(bit), None, since_us, sensor_words, later)
+
+
+def _of_state(facts: Facts, found: Collection[int]) -> Iterator[Error]:
+    """The causes from HEARTBEAT.system_status, unless a specific cause is active."""
+    state, words, since = facts.heartbeat.system_status, facts.explained.failsafe, facts.state_since
+    if state == MAV_STATE_FLIGHT_TERMINATION and not is_simulated(facts):
+        yield _error(causes.FLIGHT_TERMINATION, words, since, state_words)
+    if state == MAV_STATE_EMERGENCY and not causes.NAMED_EMERGENCIES.intersection(found):
+        crashed = facts.kind.family in facts.kind.profile.states.emergency_is_crash
+        yield _error(causes.CRASH if crashed else causes.EMERGENCY, words, since, state_words)
+    if state == MAV_STATE_CRITICAL and not causes.NAMED_FAILSAFES.intersection(found):
+        if facts.sys_status.rc_lost_with_state:
+            yield _error(causes.RC_LOST, words, since, state_and_rc_words)
+        elif not facts.latched.failsafe_over:
+            yield _error(causes.FAILSAFE, words, since, state_words)
+
+
+CONSTANT: Final = Reason("the SYS_STATUS of this autopilot never changes", sys_status_words)
+
+
+def in_error(facts: Facts, errors: list[Error]) -> Finding:
+    """TRUE with any cause; FALSE only with a fresh SYS_STATUS, which would show a cause."""
+    if errors:
+        first = errors[0]
+        return TRUE, Reason(f"{first.cause.code} {first.cause.name}", first.words, first.cause.code)
+    if not facts.fresh.sys_status:
+        return UNKNOWN, Reason("no fresh SYS_STATUS")
+    if not facts.kind.profile.sensors.are_monitored:
+        return UNKNOWN, CONSTANT
+    if facts.stop.unexplained and not facts.armed:  # a crash or a termination disarms, and a text alone says so
+        return UNKNOWN, UNEXPLAINED
+    return FALSE, Reason("no cause is active", sys_status_words)

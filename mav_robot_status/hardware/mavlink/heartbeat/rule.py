@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from ....mavlink.definitions import STATE_NAMES
 from ....mavlink.enumerations import (
     MAV_LANDED_STATE_UNDEFINED,
     MAV_MODE_FLAG_HIL_ENABLED,
@@ -11,6 +12,8 @@ from ....mavlink.enumerations import (
 )
 from ..autopilots.modes import ModeHints
 from ..facts import Facts, Fresh, Kind
+from ..identity import named
+from ..reason import Reason, at, words
 from ..state import FRESH, timeout_of
 
 if TYPE_CHECKING:
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from ..autopilots.modes import FlightMode
     from ..facts import Deadline, Facts
     from ..options import HardwareOptions
+    from ..reason import Shown
     from ..state import VehicleState
 
 
@@ -119,3 +123,26 @@ def is_initialising(facts: Facts) -> bool:
     """Whether the mode shows that the vehicle is still starting."""
     starting = facts.kind.profile.modes.initialising.get(facts.kind.family)
     return starting is not None and facts.heartbeat.custom_mode == starting
+
+
+# -- evidence in words -------------------------------------------------------------------------------------------------
+
+
+heartbeat_words: Final = words("HEARTBEAT", "heartbeat")
+base_mode_words: Final = words("HEARTBEAT.base_mode {facts.heartbeat.base_mode}", "heartbeat")
+custom_mode_words: Final = words("HEARTBEAT.custom_mode", "heartbeat")
+mode_number_words: Final = words("HEARTBEAT.custom_mode {facts.heartbeat.custom_mode}", "heartbeat")
+
+
+def state_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """The state by its name."""
+    name = named(STATE_NAMES, facts.heartbeat.system_status)
+    return f"HEARTBEAT.system_status {name}", at(state.latest.heartbeat)
+
+
+def disarm_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """What was said of a stop, if anything."""
+    return state.stop.source, state.stop.last
+
+
+UNEXPLAINED: Final = Reason("it was disarmed in motion, and frames that may tell why are lost", disarm_words)

@@ -35,6 +35,50 @@ if TYPE_CHECKING:
     from ..reason import Finding
     from ..state import VehicleState
 
+# -- facts -------------------------------------------------------------------------------------------------------------
+
+
+NO_ARMING: Final = Arming(UNKNOWN, None, ())
+
+
+def explained(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Explained:
+    """The texts that the autopilot sent."""
+    return Explained(not_ready(state, deadline), state.failsafe and state.failsafe.text)
+
+
+def not_ready(state: VehicleState, deadline: Deadline) -> tuple[NotReady, ...]:
+    """The reasons why it cannot be armed. What the latest burst of texts lacks may end when the burst is over."""
+    held = state.readiness
+    if held is readiness.NOTHING:
+        return ()
+    if held.first < math.inf and deadline.has_come(held.last + readiness.BURST):
+        held = readiness.closed(held)
+    reasons = held.reasons.values()
+    return tuple(NotReady(reason.text, reason.since.unix_us) for reason in reasons if deadline.is_within(reason.until))
+
+
+def arming(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Arming:
+    """The latest report of the arming checks, if it is complete and no newer one is overdue."""
+    report, table = state.arming, state.event_table
+    if not report.chunks or not arming_report.is_complete(report, state.events):
+        return NO_ARMING
+    if report.begun is not None and deadline.has_come(report.begun_at + arming_report.IN_PROGRESS):
+        return NO_ARMING
+    mask, beat = report.can_arm, state.latest.heartbeat
+    if mask is None or beat is None:
+        return NO_ARMING
+    group = None if table is None else table.mode_groups.get(beat.message.custom_mode)
+    checks = [] if state.heartbeats.armed else arming_report.failing(report, mask, group)
+    return Arming(
+        arming_report.can_arm(mask, group),
+        arming_report.blocked_modes(mask, table, state.modes),
+        tuple(NotReady(*reason) for reason in arming_report.reasons(checks, table)),
+    )
+
+
+# -- the rule ----------------------------------------------------------------------------------------------------------
+
+
 INHIBITS: Final = (
     "LINK_STALE DISARMED E_STOPPED SAFETY_SWITCH PREARM_FAILING INITIALISING CALIBRATING POWERING_OFF TERMINATION "
     "EMERGENCY HIL SYS_STATUS_MISSING MODE_MANUAL STOP_UNCERTAIN SENDER_UNCERTAIN HEARTBEAT_LATE"
@@ -170,41 +214,3 @@ def can_arm(facts: Facts) -> TriState:
     if facts.armed or not facts.fresh.sys_status or UNKNOWN in (reported, shown):
         return reported
     return reported if reported is shown else UNKNOWN
-
-
-NO_ARMING: Final = Arming(UNKNOWN, None, ())
-
-
-def explained(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Explained:
-    """The texts that the autopilot sent."""
-    return Explained(not_ready(state, deadline), state.failsafe and state.failsafe.text)
-
-
-def not_ready(state: VehicleState, deadline: Deadline) -> tuple[NotReady, ...]:
-    """The reasons why it cannot be armed. What the latest burst of texts lacks may end when the burst is over."""
-    held = state.readiness
-    if held is readiness.NOTHING:
-        return ()
-    if held.first < math.inf and deadline.has_come(held.last + readiness.BURST):
-        held = readiness.closed(held)
-    reasons = held.reasons.values()
-    return tuple(NotReady(reason.text, reason.since.unix_us) for reason in reasons if deadline.is_within(reason.until))
-
-
-def arming(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Arming:
-    """The latest report of the arming checks, if it is complete and no newer one is overdue."""
-    report, table = state.arming, state.event_table
-    if not report.chunks or not arming_report.is_complete(report, state.events):
-        return NO_ARMING
-    if report.begun is not None and deadline.has_come(report.begun_at + arming_report.IN_PROGRESS):
-        return NO_ARMING
-    mask, beat = report.can_arm, state.latest.heartbeat
-    if mask is None or beat is None:
-        return NO_ARMING
-    group = None if table is None else table.mode_groups.get(beat.message.custom_mode)
-    checks = [] if state.heartbeats.armed else arming_report.failing(report, mask, group)
-    return Arming(
-        arming_report.can_arm(mask, group),
-        arming_report.blocked_modes(mask, table, state.modes),
-        tuple(NotReady(*reason) for reason in arming_report.reasons(checks, table)),
-    )

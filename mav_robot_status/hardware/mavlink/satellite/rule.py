@@ -11,27 +11,56 @@ from typing import TYPE_CHECKING, Final
 from ....interface.status import RobotMode
 from ..facts import Cause, Seldom
 from ..heartbeat.rule import actuators_blocked, is_initialising
-from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
+from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason
 from .failure_flags import failures
+from .state import speed
 
 if TYPE_CHECKING:
     from ..autopilots.modes import FlightMode
     from ..facts import Deadline, Facts, Seldom
     from ..options import HardwareOptions
+    from ..reason import Reason, Shown
     from ..state import VehicleState
 
-SOURCE: Final = Source.HIGH_LATENCY
-ARMED_UNTOLD: Final = Reason("this HIGH_LATENCY2 does not say whether the vehicle is armed", SOURCE)
-STATE_UNTOLD: Final = Reason("armed, but HIGH_LATENCY2 does not report MAV_STATE", SOURCE)
-MOVES: Final = Reason("two messages show motion", SOURCE)
-NOT_MOVING: Final = Reason("nothing shows motion, and samples so far apart cannot show rest", SOURCE)
+# -- facts -------------------------------------------------------------------------------------------------------------
+
+
+def seldom(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Seldom | None:
+    """What HIGH_LATENCY2 tells of a vehicle that sends nothing else."""
+    known = state.high_latency
+    if known is None:
+        return None
+    found = tuple(Cause(code, None, since) for code, since in failures(known, options))
+    return Seldom(known.armed, known.moves, found)
+
+
+# -- evidence in words -------------------------------------------------------------------------------------------------
+
+
+def high_latency_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """What HIGH_LATENCY2 says."""
+    known = state.high_latency
+    if known is None:
+        return None, None
+    m = known.message
+    text = f"custom_mode {m.custom_mode}, custom0 {m.custom0}, failure_flags 0x{m.failure_flags:x}"
+    return f"HIGH_LATENCY2: {text}, groundspeed {speed(m):g} m/s", known.at
+
+
+# -- the rule ----------------------------------------------------------------------------------------------------------
+
+
+ARMED_UNTOLD: Final = Reason("this HIGH_LATENCY2 does not say whether the vehicle is armed", high_latency_words)
+STATE_UNTOLD: Final = Reason("armed, but HIGH_LATENCY2 does not report MAV_STATE", high_latency_words)
+MOVES: Final = Reason("two messages show motion", high_latency_words)
+NOT_MOVING: Final = Reason("nothing shows motion, and samples so far apart cannot show rest", high_latency_words)
 
 
 def e_stopped(options: HardwareOptions) -> Finding:
     """Never known."""
     if options.estop_unknown_as == "false":
         return FALSE, Reason("estop_unknown_as: false")
-    return UNKNOWN, Reason("HIGH_LATENCY2 does not show an emergency stop", SOURCE)
+    return UNKNOWN, Reason("HIGH_LATENCY2 does not show an emergency stop", high_latency_words)
 
 
 def drives_powered(told: Seldom, facts: Facts, options: HardwareOptions) -> Finding:
@@ -39,10 +68,10 @@ def drives_powered(told: Seldom, facts: Facts, options: HardwareOptions) -> Find
     if told.armed is UNKNOWN:
         return UNKNOWN, ARMED_UNTOLD
     if told.armed is FALSE:
-        return FALSE, Reason("disarmed", SOURCE)
+        return FALSE, Reason("disarmed", high_latency_words)
     if actuators_blocked(facts, options):
-        return FALSE, Reason("hardware in the loop: actuators blocked", SOURCE)
-    return TRUE, Reason("armed", SOURCE)
+        return FALSE, Reason("hardware in the loop: actuators blocked", high_latency_words)
+    return TRUE, Reason("armed", high_latency_words)
 
 
 def motion_possible(facts: Facts, options: HardwareOptions, mode: FlightMode, drives: Finding) -> Finding:
@@ -51,10 +80,12 @@ def motion_possible(facts: Facts, options: HardwareOptions, mode: FlightMode, dr
     if powered is FALSE:
         return FALSE, why._replace(rule=f"drives_powered is false: {why.rule}")
     if options.manual_blocks_motion and mode.mode is RobotMode.MANUAL:
-        return FALSE, Reason("manual mode (manual_blocks_motion)", SOURCE)
+        return FALSE, Reason("manual mode (manual_blocks_motion)", high_latency_words)
     if powered is UNKNOWN:
         return UNKNOWN, why
-    return (FALSE, Reason("mode INITIALIZING", SOURCE)) if is_initialising(facts) else (UNKNOWN, STATE_UNTOLD)
+    return (
+        (FALSE, Reason("mode INITIALIZING", high_latency_words)) if is_initialising(facts) else (UNKNOWN, STATE_UNTOLD)
+    )
 
 
 def in_motion(told: Seldom) -> Finding:
@@ -71,12 +102,3 @@ def inhibits(told: Seldom, facts: Facts, options: HardwareOptions, mode: FlightM
         "MODE_MANUAL": options.manual_blocks_motion and mode.mode is RobotMode.MANUAL,
     }
     return [name for name, applies in reasons.items() if applies]
-
-
-def seldom(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> Seldom | None:
-    """What HIGH_LATENCY2 tells of a vehicle that sends nothing else."""
-    known = state.high_latency
-    if known is None:
-        return None
-    found = tuple(Cause(code, None, since) for code, since in failures(known, options))
-    return Seldom(known.armed, known.moves, found)

@@ -1,7 +1,7 @@
 """The facts of a vehicle: the complete input of the rules. A new status is derived only when they change.
 
-`settle` makes them from the state. A rule can read nothing else, and every fact is compared. Times of arrival are not
-facts, because each message changes them; `evidence` reads them from the state.
+The subjects make them from the state, see `subjects`. A rule can read nothing else, and every fact is compared. Times
+of arrival are not facts, because each message changes them; the words of a `Reason` read them from the state.
 """
 
 from __future__ import annotations

@@ -148,18 +148,21 @@ class MavlinkRobotHW(RobotHW):
         self._touch(tracked, -math.inf if message_id in EDGES else now.mono + SETTLES)
         if said is None or speaker is not tracked.belief.main:
             return None
-        if message_id == HEARTBEAT_ID:
-            if not is_autopilot(message, ids[1]):
-                return None
+        if message_id != HEARTBEAT_ID:
+            self._note(tracked, message_id, message, now)
+        elif is_autopilot(message, ids[1]):
             tracked.handle.heard_at = said.mono
             return tracked
+        return None
+
+    def _note(self, tracked: TrackedVehicle, message_id: int, message: Any, now: Instant) -> None:
+        """News of the main speaker of a vehicle, besides its HEARTBEAT: for the requests, and for files."""
         if message_id == HIGH_LATENCY_ID:
             _note_statement(tracked)
         elif message_id in FILE_IDS:
             self._hear_file(tracked, message, now)
         elif tracked.requests is not None:
             self._asking.heard(tracked, message, message_id, now.mono)
-        return None
 
     def _first_heard(self, frame: Values, now: Instant) -> TrackedVehicle | None:
         """The vehicle of an autopilot that sends its first HEARTBEAT or HIGH_LATENCY2; None for every other frame."""

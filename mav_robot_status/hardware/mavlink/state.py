@@ -1,4 +1,4 @@
-"""The state of one vehicle. Messages change it (`handlers`), time alone does not.
+"""The state of one vehicle. Messages change it, time alone does not.
 
 It holds no clock and no socket, so a recording gives the same state as the live link did. Only the record itself
 changes. Its parts are values, except for the records that messages change in place.

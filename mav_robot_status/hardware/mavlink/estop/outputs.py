@@ -151,24 +151,29 @@ def heard_outputs(
     demanded = throttle is not None and throttle >= DEMAND
     if not watch.proved:
         watch.proved = _is_proof(watch, known, motors, assumed, vehicle_type, throttle if demanded else None)
-    if not (at_stop and demanded):
-        watch.idle_since, watch.idle = None, False
-    elif watch.idle_since is None:
-        watch.idle_since = now
-    elif now >= watch.idle_since + HOLD and throttle_at > watch.idle_since:
-        watch.idle = True
-    if not (at_stop and demanded and watch.proved and watch.driven_seen):
-        watch.held_since, watch.held = None, False
-    elif watch.held_since is None:
-        watch.held_since, watch.speed_then = now, speed
-    elif now >= watch.held_since + HOLD and throttle_at > watch.held_since:
-        watch.held = True
+    _note_rest(watch, at_stop and demanded, throttle_at, speed, now)
     watch.driven = (off_stop and (watch.proved or not assumed)) or lifting
     watch.driven_seen = watch.driven_seen or watch.driven
     if not (hovers and at_stop and watch.driven_seen):
         watch.off_since = None
     elif watch.off_since is None:
         watch.off_since = now
+
+
+def _note_rest(watch: Watch, rests: bool, throttle_at: float, speed: float, now: float) -> None:
+    """Note since when the outputs are at their stop value while throttle is demanded (`rests`), and are held there."""
+    if not rests:
+        watch.idle_since, watch.idle = None, False
+    elif watch.idle_since is None:
+        watch.idle_since = now
+    elif now >= watch.idle_since + HOLD and throttle_at > watch.idle_since:
+        watch.idle = True
+    if not (rests and watch.proved and watch.driven_seen):
+        watch.held_since, watch.held = None, False
+    elif watch.held_since is None:
+        watch.held_since, watch.speed_then = now, speed
+    elif now >= watch.held_since + HOLD and throttle_at > watch.held_since:
+        watch.held = True
 
 
 def _distances(watch: Watch, motors: tuple[int, ...]) -> list[int]:

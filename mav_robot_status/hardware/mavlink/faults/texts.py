@@ -9,7 +9,7 @@ from ....mavlink.enumerations import MAV_STATE_CRITICAL, MAV_STATE_FLIGHT_TERMIN
 from ..autopilots import firmware
 from ..autopilots import texts as text_rules
 from ..autopilots.profile import StopText
-from ..autopilots.texts import UNCLASSIFIED, Effect, When, classify
+from ..autopilots.texts import UNCLASSIFIED, Effect, TextRule, When, classify
 from ..estop import state as estop
 from ..readiness import state as readiness
 from ..state import Statement, ToldFirmware, honours_stop, is_fresh
@@ -61,10 +61,14 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
         state.firmware = ToldFirmware(version, now.mono, f"STATUSTEXT: {words}")
         return
     rule = classify(words, state.profile.texts.rules)
-    if rule is None:
-        if text.severity <= UNCLASSIFIED and state.heartbeats.armed and classify(words, text_rules.COMMON) is None:
-            state.latches = latches.announce(state.latches, causes.TEXT + text.severity, words, now)
-        return
+    if rule is not None:
+        _apply(state, rule, words, now)
+    elif text.severity <= UNCLASSIFIED and state.heartbeats.armed and classify(words, text_rules.COMMON) is None:
+        state.latches = latches.announce(state.latches, causes.TEXT + text.severity, words, now)
+
+
+def _apply(state: VehicleState, rule: TextRule, words: str, now: Instant) -> None:
+    """What a text says according to its row."""
     effect = rule.effect
     if effect is Effect.CAUSE and not _counts(rule.when, state):
         effect = Effect.DETAIL if state.heartbeats.armed else Effect.READINESS
@@ -73,18 +77,7 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
     elif effect is Effect.CLEAR:
         cleared(state, words, rule.codes, now.mono)
     elif effect in (Effect.ESTOP, Effect.RELEASE):
-        if state.profile.stops.outputs_show and state.heartbeats.armed and not honours_stop(state):
-            return
-        engaged = effect is Effect.ESTOP
-        if engaged and state.heartbeats.armed and estop.REFUSES in words:
-            state.stop = estop.doubted(state.stop, estop.LATE, now.mono)  # it was armed since, or is checked anew
-        else:
-            state.stop = estop.said(state.stop, engaged, words, now)
-        state.assumed_free = False
-        if state.profile.texts.stop_text is StopText.STATE:
-            state.failsafe = _say(state.failsafe, words, now)
-        elif engaged:
-            _not_ready(state, words, now)
+        _stop_said(state, effect is Effect.ESTOP, words, now)
     elif effect is Effect.READINESS:
         _not_ready(state, words, now)
         denied_by = state.profile.speeds.denied_by
@@ -92,6 +85,22 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
             state.denied_at = now.mono
     elif effect is Effect.DETAIL:
         state.failsafe = _say(state.failsafe, words, now)
+
+
+def _stop_said(state: VehicleState, engaged: bool, words: str, now: Instant) -> None:
+    """A text about an emergency stop."""
+    armed = state.heartbeats.armed
+    if state.profile.stops.outputs_show and armed and not honours_stop(state):
+        return
+    if engaged and armed and estop.REFUSES in words:
+        state.stop = estop.doubted(state.stop, estop.LATE, now.mono)  # it was armed since, or is checked anew
+    else:
+        state.stop = estop.said(state.stop, engaged, words, now)
+    state.assumed_free = False
+    if state.profile.texts.stop_text is StopText.STATE:
+        state.failsafe = _say(state.failsafe, words, now)
+    elif engaged:
+        _not_ready(state, words, now)
 
 
 def _counts(when: When, state: VehicleState) -> bool:

@@ -44,14 +44,11 @@ TICKS: Final = 1.5
 
 def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: HardwareOptions) -> None:
     """A HEARTBEAT: edges of armed and state, stop values, and whether the autopilot has rebooted."""
-    if (message.autopilot, message.type) != (state.autopilot, state.vehicle_type):
+    satellite, state.high_latency = state.high_latency, None
+    is_another = (message.autopilot, message.type) != (state.autopilot, state.vehicle_type)
+    if is_another or (satellite is not None and _sent_none(state)):
         _another(state, message, now)
         return
-    if state.high_latency is not None:
-        state.high_latency = None
-        if _sent_none(state):
-            _another(state, message, now)
-            return
     pass_time(state, now, options)
     before = state.heartbeats
     last = before.runs[-1].last
@@ -62,41 +59,55 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
     seen = state.latest
     previous: Heartbeat = seen.heartbeat.message if seen.heartbeat else message
     seen.heartbeat = heard(message, now.mono, seen.heartbeat)
-    if message != previous and starts_anew(previous, message, state):
-        rebooted(state, now.mono, now)
-    if state.started_at is not None:
-        started, state.started_at = state.started_at, None
-        if _is_another_run(state, started):
-            rebooted(state, started, now)
+    _look_for_reboot(state, previous, message, now)
     if now.mono - last > LONG_LOSS:
-        state.latches = latches.NO_LATCHES
-        state.failsafe_cleared = None
-        state.failsafe = None
-        state.readiness = readiness.NOTHING
+        state.latches, state.readiness = latches.NO_LATCHES, readiness.NOTHING
+        state.failsafe_cleared = state.failsafe = None
     if not connected:
-        state.motion, state.gps_motion, state.rotation = Motion(), Motion(), Motion()
-        state.stop = estop.unsure(state.stop, estop.LINK_LOST, now.mono)
-        state.arming = arming_report.NOTHING  # a newer one may be lost
-    if before.armed and not heartbeats.armed and now.mono - last < SUDDEN:
-        state.told_armed = now.mono + 1e-6
-    if before.armed and not heartbeats.armed and state.motion.value is TriState.TRUE and state.family in FLIES:
-        state.disarmed_at = now.mono
-        state.note_loss(state.lost_at)
-    elif heartbeats.armed:
+        _reconnected(state, now)
+    if heartbeats.armed:
         state.disarmed_at, state.unexplained = None, False
-    if heartbeats.armed and not (before.armed and connected):
-        state.armed_after = seen.sys_status.message if seen.sys_status is not None else None
-    if not connected or (before.armed and not heartbeats.armed):
-        state.stop = state.stop._replace(ready=0)
-        state.assumed_free = False
-    if heartbeats.armed and not before.armed:
-        _armed(state, last, now)
+        if not (before.armed and connected):
+            state.armed_after = seen.sys_status.message if seen.sys_status is not None else None
+        if not before.armed:
+            _armed(state, last, now)
+    elif before.armed:
+        _disarmed(state, last, now)
     if state.profile.stops.shown_by is EmergencyStop.STATE and message.system_status == MAV_STATE_FLIGHT_TERMINATION:
         state.stop = estop.NOTHING  # its state shows its stops, so what it said is not needed
     look_again(state, now.mono)
     if heartbeats.calm_since == now.mono:
         state.failsafe = None
         state.latches = latches.calmed(state.latches, before.state_since.mono)
+
+
+def _look_for_reboot(state: VehicleState, previous: Heartbeat, message: Heartbeat, now: Instant) -> None:
+    """A HEARTBEAT, or a text since the one before, may say that the autopilot starts."""
+    if starts_anew(previous, message, state):
+        rebooted(state, now.mono, now)
+    if state.started_at is not None:
+        started, state.started_at = state.started_at, None
+        if _is_another_run(state, started):
+            rebooted(state, started, now)
+
+
+def _reconnected(state: VehicleState, now: Instant) -> None:
+    """The first HEARTBEAT after a link loss: what may have changed in between is invalid."""
+    state.motion, state.gps_motion, state.rotation = Motion(), Motion(), Motion()
+    state.stop = estop.unsure(state.stop, estop.LINK_LOST, now.mono)._replace(ready=0)
+    state.arming = arming_report.NOTHING  # a newer one may be lost
+    state.assumed_free = False
+
+
+def _disarmed(state: VehicleState, previous_beat: float, now: Instant) -> None:
+    """The first disarmed HEARTBEAT after an armed one."""
+    if now.mono - previous_beat < SUDDEN:
+        state.told_armed = now.mono + 1e-6
+    if state.motion.value is TriState.TRUE and state.family in FLIES:
+        state.disarmed_at = now.mono
+        state.note_loss(state.lost_at)
+    state.stop = state.stop._replace(ready=0)
+    state.assumed_free = False
 
 
 def _another(state: VehicleState, message: Heartbeat, now: Instant) -> None:

@@ -86,7 +86,7 @@ def messages(data: bytes) -> int:
         message_id = 0 if count <= 3 else SOME[chunk[2] % len(SOME)]
         now = Instant(mono, int(mono * 1e6))
         (frame,) = parser.feed(enclose(message_id, chunk[3:], system=system, component=1, sequence=count & 255))
-        hw.take(frame, now)
+        hw.on_frame(frame, now)
         if mono >= hw.next_due():
             hw.read(now)
             hw.due_requests(now)
@@ -158,7 +158,7 @@ def events(data: bytes) -> int:
         beat = Heartbeat(4 << 16, 2, 12, 209, 4, 3)
         for number, message in enumerate((beat, _event(chunk, count))):
             (frame,) = parser.feed(encode(message, system=1, component=1, sequence=2 * count + number & 255))
-            hw.take(frame, now)
+            hw.on_frame(frame, now)
         hw.read(now)
         hw.due_requests(now)
     (tracked,) = hw.vehicles

@@ -102,7 +102,7 @@ class MavlinkHardware:
         """Whether the tables of PX4's events are looked for, in the cache and on the vehicles."""
         self.tables.wanted = wants_tables(config)
         self.vehicles.ask_for_tables(self.tables.wanted)
-        self.vehicles.hear_file = self.tables.heard
+        self.vehicles.on_file = self.tables.heard
 
     def _use_table(self, ids: tuple[int, int], table: EventTable) -> None:
         """A vehicle has this table of events."""
@@ -156,7 +156,7 @@ class MavlinkHardware:
                 continue
             if vehicles.deadline < at.mono:
                 vehicles.read(at)
-            vehicle = vehicles.take(frame, at, channel, self.hub.lag(frame))
+            vehicle = vehicles.on_frame(frame, at, channel, self.hub.lag(frame))
             if vehicle is not None and vehicle.ids is not None:
                 self.hub.heard_vehicle(vehicle.ids, channel, at.mono)
             if self.observers:
@@ -277,9 +277,9 @@ class LinkSource:
             self._connections = self._endpoint.connections
             hardware.vehicles.reconnected(self._hub.vehicles_on(self._endpoint), now.mono)
             self._hub.reconnected(self._endpoint)
-        take, lag = hardware.vehicles.take, self._hub.lag
+        on_frame, lag = hardware.vehicles.on_frame, self._hub.lag
         for frame, channel in heard:
-            vehicle = take(frame, now, channel, lag(frame))
+            vehicle = on_frame(frame, now, channel, lag(frame))
             if vehicle is not None and vehicle.ids is not None:
                 self._hub.heard_vehicle(vehicle.ids, channel, now.mono)
         if hardware.observers:

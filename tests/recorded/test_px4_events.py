@@ -30,7 +30,7 @@ def counted(path: Path, table: EventTable | None) -> Counter[str]:
     for now, frame, _ in Recording(str(path)):
         if frame is None:
             continue
-        hw.take(frame, now)
+        hw.on_frame(frame, now)
         hw.read(now)
         vehicle = hw.find(1, 1)
         if vehicle is None or not vehicle.facts or frame[1] != (1, 1):

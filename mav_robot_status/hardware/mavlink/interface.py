@@ -1,6 +1,6 @@
 """`MavlinkRobotHW`: the hardware interface. It processes frames, keeps the state of each vehicle, and sets the handles.
 
-The cycle of ros_control: `take` each frame, `read(time)` into the handles, then send the `due_requests(time)`.
+The cycle of ros_control: `on_frame` for each frame, `read(time)` into the handles, then send the `due_requests(time)`.
 
 Every frame takes one path. `belief` says who spoke, and when; a handler changes the state of that speaker; the vehicle
 is due: at once after an edge (armed, a text, an acknowledgement), else at most SETTLES later. `read` then settles all
@@ -30,7 +30,8 @@ from .requests.scheduler import Ask, RequestScheduler
 from .satellite.state import stated
 from .slots import VehicleSlots
 from .subjects import APPLET_ID, ARM_STATUS_ID, COMMAND_IDS, EDGES, FILE_IDS, HEARTBEAT_ID, HIGH_LATENCY_ID
-from .update import on_frame, status_at
+from .update import on_frame as apply_frame
+from .update import status_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Container, Hashable, Iterator, Sequence
@@ -72,7 +73,7 @@ class MavlinkRobotHW(RobotHW):
         """When the status of each vehicle may change. -inf: at once."""
         self.asks = False
         """Whether `due_requests` is called at all."""
-        self.hear_file: Callable[[TrackedVehicle, Any, float], None] | None = None
+        self.on_file: Callable[[TrackedVehicle, Any, float], None] | None = None
         """Called with each message of a vehicle that brings a file or its place."""
         self._event_table: EventTable | None = None
         """The words for the events of each vehicle without its own table."""
@@ -126,7 +127,7 @@ class MavlinkRobotHW(RobotHW):
                 speaker.state.event_table = table
         self._touch(tracked, -math.inf)
 
-    def take(self, frame: Values, now: Instant, source: Hashable = None, lag: float = 0.0) -> TrackedVehicle | None:
+    def on_frame(self, frame: Values, now: Instant, source: Hashable = None, lag: float = 0.0) -> TrackedVehicle | None:
         """Process one frame. `source`: where it arrived; None if there is one place only.
 
         `lag`: how late it is by its signature, seconds. Returns the vehicle if the frame is a heartbeat of its
@@ -135,12 +136,10 @@ class MavlinkRobotHW(RobotHW):
         message_id, ids, _, message, _, _ = frame
         if message_id in COMMAND_IDS and message is not None:
             self._overhear(message, ids, now)
-        tracked = self._tracked.get(ids)
+        tracked = self._tracked.get(ids) or self._first_heard(frame, now)
         if tracked is None:
-            tracked = self._first_heard(frame, now)
-            if tracked is None:
-                return None
-        _, speaker, said = on_frame(tracked, frame, source, now, lag, self.options)
+            return None
+        _, speaker, said = apply_frame(tracked, frame, source, now, lag, self.options)
         if speaker is None:
             if message_id == HEARTBEAT_ID:
                 self._touch(tracked, -math.inf)
@@ -148,21 +147,15 @@ class MavlinkRobotHW(RobotHW):
         self._touch(tracked, -math.inf if message_id in EDGES else now.mono + SETTLES)
         if said is None or speaker is not tracked.belief.main:
             return None
-        if message_id != HEARTBEAT_ID:
-            self._note(tracked, message_id, message, now)
-        elif is_autopilot(message, ids[1]):
-            tracked.handle.heard_at = said.mono
-            return tracked
-        return None
-
-    def _note(self, tracked: TrackedVehicle, message_id: int, message: Any, now: Instant) -> None:
-        """News of the main speaker of a vehicle, besides its HEARTBEAT: for the requests, and for files."""
+        if message_id == HEARTBEAT_ID:
+            return _note_heartbeat(tracked, message, said.mono)
         if message_id == HIGH_LATENCY_ID:
             _note_statement(tracked)
         elif message_id in FILE_IDS:
-            self._hear_file(tracked, message, now)
+            self._on_file_message(tracked, message, now)
         elif tracked.requests is not None:
             self._asking.heard(tracked, message, message_id, now.mono)
+        return None
 
     def _first_heard(self, frame: Values, now: Instant) -> TrackedVehicle | None:
         """The vehicle of an autopilot that sends its first HEARTBEAT or HIGH_LATENCY2; None for every other frame."""
@@ -296,12 +289,12 @@ class MavlinkRobotHW(RobotHW):
                 if tracked.state.faulty_parts is not before:
                     self._touch(tracked, -math.inf)
 
-    def _hear_file(self, tracked: TrackedVehicle, message: Any, now: Instant) -> None:
+    def _on_file_message(self, tracked: TrackedVehicle, message: Any, now: Instant) -> None:
         """Hand on where a table of events is, or a piece of it."""
         if type(message) is mav.ComponentMetadata and tracked.requests is not None:
             tracked.requests.delivered(METADATA.id)
-        if self.hear_file is not None:
-            self.hear_file(tracked, message, now.mono)
+        if self.on_file is not None:
+            self.on_file(tracked, message, now.mono)
 
     def _discover(self, ids: tuple[int, int], heartbeat: mav.Heartbeat, now: Instant) -> TrackedVehicle | None:
         """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
@@ -426,6 +419,14 @@ class MavlinkRobotHW(RobotHW):
             log.info("vehicle %d.%d is back", *ids)
             if tracked.requests is not None:
                 tracked.requests.reconnected(tracked.handle.heard_at or 0.0)
+
+
+def _note_heartbeat(tracked: TrackedVehicle, message: mav.Heartbeat, at: float) -> TrackedVehicle | None:
+    """Note when the autopilot of the vehicle sent its last HEARTBEAT; None if this one is of another sender."""
+    if not is_autopilot(message, tracked.component):
+        return None
+    tracked.handle.heard_at = at
+    return tracked
 
 
 def _note_statement(tracked: TrackedVehicle) -> None:

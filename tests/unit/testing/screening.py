@@ -83,7 +83,7 @@ class Screening:
 
     def _receive(self, data: bytes) -> None:
         for frame in self._parser.feed(data):
-            self.hw.take(frame, self.clock.now())
+            self.hw.on_frame(frame, self.clock.now())
 
     def _read(self) -> None:
         now = self.clock.now()

@@ -199,7 +199,7 @@ class Flight:
         return self.look()
 
     def _take(self, message: Any, ids: Ids) -> None:
-        self.hw.take(frame_of(message, ids, self._numbers.next(ids)), self.clock.now())
+        self.hw.on_frame(frame_of(message, ids, self._numbers.next(ids)), self.clock.now())
 
     def lose(self, frames: int = 1) -> Flight:
         """Send this many frames that do not arrive."""

@@ -162,7 +162,7 @@ class Walk:
 
     def take(self, message: Any, seconds: float = 0.0) -> RobotStatus:
         self.now = later(self.now, seconds)
-        self.hw.take(frame_of(message, sequence=self._numbers.next(None)), self.now)
+        self.hw.on_frame(frame_of(message, sequence=self._numbers.next(None)), self.now)
         self.hw.read(self.now)
         return self.status
 
@@ -334,7 +334,7 @@ def test_any_payload_is_accepted(message_id: int, payload: bytes, version: int) 
         return
     data = enclose(message_id, payload, system=1, component=1, sequence=0, version=version)
     (frame,) = Parser(WANTED_IDS).feed(data)
-    flight.hw.take(frame, flight.clock.now())
+    flight.hw.on_frame(frame, flight.clock.now())
     flight.hw.read(flight.clock.now())
     check_invariants(flight.status, flight.detail, flight.hw.options)
 

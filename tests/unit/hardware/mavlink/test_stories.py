@@ -239,7 +239,7 @@ def another_sender_disagrees_for_some_time() -> None:
     for number in range(8):
         flight.wait(1)
         armed = flight.heartbeat()._replace(base_mode=209)
-        flight.hw.take(frame_of(armed, sequence=100 + number), flight.clock.now(), "another channel")
+        flight.hw.on_frame(frame_of(armed, sequence=100 + number), flight.clock.now(), "another channel")
     assert flight.wait(0.5)[-1].error_code == 9002
     flight.wait(20)
     assert flight.codes == []

@@ -190,6 +190,6 @@ def test_a_vehicle_that_another_sender_says_is_armed_is_not_asked() -> None:
     flight.wait(5)
     armed = flight.heartbeat()._replace(base_mode=129)
     for _ in range(40):
-        flight.hw.take(frame_of(armed), flight.clock.now(), "another way")
+        flight.hw.on_frame(frame_of(armed), flight.clock.now(), "another way")
         flight.set(health=FITTED).wait(0.5)
     assert asked(flight) == 0

@@ -56,7 +56,7 @@ class Sky:
             seconds = self.clock.now().mono - self._start + 1000
             message = message._replace(**{"timestamp": round(seconds * 1000)} | told)
         frame: Frame = frame_of(message, sequence=sequence)
-        self.hw.take(frame, self.clock.now(), way)
+        self.hw.on_frame(frame, self.clock.now(), way)
         return self.look() if frame.message_id in EDGES else self.wait(SETTLES + 1e-6)
 
     def beat(self, way: Any = "radio", *, armed: bool = False, autopilot: int = ARDUPILOT, **how: Any) -> RobotStatus:

@@ -130,7 +130,7 @@ def test_hardware_in_the_loop_blocks_the_actuators() -> None:
 
 def test_a_message_of_a_camera_is_no_vehicle() -> None:
     sky = Sky()
-    sky.hw.take((235, (1, 100), 1, ardupilot(autopilot=8), b"", 0), sky.clock.now(), None)
+    sky.hw.on_frame((235, (1, 100), 1, ardupilot(autopilot=8), b"", 0), sky.clock.now(), None)
     assert list(sky.hw.vehicles) == []
 
 
@@ -466,12 +466,12 @@ def test_nothing_is_asked_of_a_vehicle_behind_a_satellite() -> None:
 def test_forged_messages_do_not_keep_the_places_of_vehicles_for_a_minute() -> None:
     sky = Sky()
     for ids in [(system, component) for system in range(2, 66) for component in (1, 2, 3, 4)]:
-        sky.hw.take(frame_of(px4(timestamp=5), ids), sky.clock.now(), None)
+        sky.hw.on_frame(frame_of(px4(timestamp=5), ids), sky.clock.now(), None)
     assert len(list(sky.hw.vehicles)) == 256
     sky.hw.read(sky.clock.now())
     for _ in range(10):
         sky.clock.advance(1.0)
-        sky.hw.take(frame_of(mav.Heartbeat(4, QUAD, PX4, 81, 3, 3)), sky.clock.now(), None)
+        sky.hw.on_frame(frame_of(mav.Heartbeat(4, QUAD, PX4, 81, 3, 3)), sky.clock.now(), None)
         sky.hw.read(sky.clock.now())
     found = sky.hw.find(1, 1)
     assert found is not None

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
 from ..errors import MavRobotStatusError
-from .arrival import LATE, STALL
 from .controller_config import check
+from .links.arrival import LATE, STALL
 from .live_hardware import LiveHardware
 from .metrics import metrics
 from .pace import MOST_AT_ONCE, UNCOUNTED, Pace
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..config import Config
     from ..interface import IoSource, Metrics
-    from .endpoint import Endpoint
+    from .links.endpoint import Endpoint
     from .observer import Observer
 
 log = logging.getLogger(__name__)

@@ -10,7 +10,7 @@ from ..hardware.combined import CombinedRobotHW
 from ..hardware.group import Group
 from ..interface import HardwareContext
 from . import plugins
-from .guarded_hardware import GuardedHardware
+from .guards.hardware import GuardedHardware
 from .mavlink_hardware import MavlinkHardware
 
 if TYPE_CHECKING:

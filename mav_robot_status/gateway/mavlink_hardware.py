@@ -15,10 +15,10 @@ from ..hardware.mavlink.px4_events.parsing import parse
 from ..hardware.mavlink.vehicle import ExpectedVehicle
 from ..mavlink.commands import ROBOT_STATUS
 from .controller_config import publishes
-from .event_table_cache import EventTableCache, default_folder
-from .event_table_file import event_table
-from .event_tables import EventTables
-from .link_hub import LinkHub
+from .events.cache import EventTableCache, default_folder
+from .events.file import event_table
+from .events.tables import EventTables
+from .links.link_hub import LinkHub
 from .pace import MOST_AT_ONCE
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from ..hardware.mavlink.px4_events import EventTable
     from ..interface import IndustrialRobotStatusInterface, IoSource
     from ..mavlink.framing import Frame
-    from .channel import Channel
-    from .endpoint import Endpoint
+    from .links.channel import Channel
+    from .links.endpoint import Endpoint
     from .observer import Observer
 
 log = logging.getLogger(__name__)

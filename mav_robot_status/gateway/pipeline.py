@@ -39,10 +39,9 @@ from .controller_config import (
     publisher_key,
     publishers_of,
 )
-from .guarded_controller import GuardedController
-from .guarded_publisher import GuardedPublisher
-from .single_handle import SingleHandles
-from .unread_handles import UnreadHandles
+from .guards.controller import GuardedController
+from .guards.publisher import GuardedPublisher
+from .handles import SingleHandles, UnreadHandles
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -9,7 +9,7 @@ import pytest
 from mav_robot_status.clock import Instant
 from mav_robot_status.config import Config, LinkConfig
 from mav_robot_status.errors import LinkError
-from mav_robot_status.gateway.link_hub import LinkHub
+from mav_robot_status.gateway.links.link_hub import LinkHub
 from mav_robot_status.links import Address, LinkKind, Received, Url, kinds
 from mav_robot_status.links.guarded import RETRY, STABLE_AFTER, GuardedLink, open_guarded
 from mav_robot_status.links.url import parse

@@ -1,0 +1,1 @@
+"""Guards around the parts of third parties: hardware interfaces, controllers, publishers."""

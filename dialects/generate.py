@@ -108,7 +108,7 @@ IMPORTS = """from __future__ import annotations
 from struct import Struct
 from typing import {}
 
-from values import NamedTuple
+from ..values import NamedTuple
 """
 
 

@@ -152,7 +152,7 @@ class EventLoop:
         `looked` is the instant of the last look at the links, `wait` how many seconds the loop wanted to wait.
         """
         stalled = now.mono - looked.mono > max(wait, 0.0) + STALL
-        self.hardware.mavlink.hub.pause(looked, now, stalled=stalled)
+        self.hardware.mavlink.hub.receiver.pause(looked, now, stalled=stalled)
         return MOST_AFTER_PAUSE if stalled else MOST_AT_ONCE
 
     def turn(self, now: Instant) -> None:

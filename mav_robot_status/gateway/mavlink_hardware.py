@@ -70,7 +70,7 @@ class MavlinkHardware:
         """Open the links; with `opens` False only `open` does it. Raises LinkError, UsageError."""
         self._event_table = event_table(config)
         self.hub = LinkHub(config if opens else Config(), clock, observers)
-        self.vehicles = robot_hw(config, self.hub.beliefs, self._event_table)
+        self.vehicles = robot_hw(config, self.hub.members.beliefs, self._event_table)
         self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
         self.tables = EventTables(self.hub, self._use_table, parse, cache=EventTableCache(default_folder()))
         self.changed = False
@@ -95,7 +95,7 @@ class MavlinkHardware:
         self._timer_due = AT_ONCE
         self._want_tables(config)
         if publishes(config, "mavlink"):
-            self.hub.offered |= {ROBOT_STATUS}
+            self.hub.receiver.commands.offered |= {ROBOT_STATUS}
         self._sources = tuple(LinkSource(endpoint, self) for endpoint in self.hub.endpoints)
 
     def _want_tables(self, config: Config) -> None:
@@ -121,13 +121,13 @@ class MavlinkHardware:
         # a waiting frame of a closed link would bring its vehicle back
         self._waiting = [one for one in self._waiting if one[2].endpoint in self.hub.endpoints]
         self._event_table = table
-        self.vehicles.forget(self.hub.vehicles())
+        self.vehicles.forget(self.hub.members.vehicles())
         self.vehicles.changed = True
         self._configure(config)
 
     def renew(self) -> None:
         """Use the vehicles and options of the new configuration. Vehicles in both configurations keep their state."""
-        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.beliefs, self._event_table)
+        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.members.beliefs, self._event_table)
         self.vehicles.adopt(before)
         self.vehicles.asks = before.asks
         self._want_tables(self._config)
@@ -141,7 +141,7 @@ class MavlinkHardware:
 
     def receive_late(self, endpoint: Endpoint, now: Instant, limit: int) -> None:
         """Receive on a link whose input may be old."""
-        for at, heard in self.hub.receive_late(endpoint, now, limit):
+        for at, heard in self.hub.receiver.receive_late(endpoint, now, limit):
             self._waiting += [(at, frame, channel) for frame, channel in heard]
 
     def _take_waiting(self) -> None:
@@ -156,9 +156,9 @@ class MavlinkHardware:
                 continue
             if vehicles.deadline < at.mono:
                 vehicles.read(at)
-            vehicle = vehicles.take(frame, at, channel, self.hub.lag(frame))
+            vehicle = vehicles.take(frame, at, channel, self.hub.receiver.lag(frame))
             if vehicle is not None and vehicle.ids is not None:
-                self.hub.heard_vehicle(vehicle.ids, channel, at.mono)
+                self.hub.members.heard_vehicle(vehicle.ids, channel, at.mono)
             if self.observers:
                 self.observe([(frame, channel)], at)
 
@@ -175,7 +175,7 @@ class MavlinkHardware:
     def read(self, now: Instant) -> None:
         """Update the handles to `now`."""
         hub, vehicles = self.hub, self.vehicles
-        hub.needs_turn = False
+        hub.receiver.needs_turn = False
         if self._waiting:
             self._take_waiting()
         self._read_at = now.mono
@@ -185,8 +185,8 @@ class MavlinkHardware:
 
     def write(self, now: Instant) -> None:
         """Send the due requests and heartbeats."""
-        if self.vehicles.asks and (self.hub.has_passive or now.mono >= self.vehicles.requests_due):
-            for ask in self.vehicles.due_requests(now, self.hub.passive_vehicles(), self.hub.may_ask):
+        if self.vehicles.asks and (self.hub.members.has_passive or now.mono >= self.vehicles.requests_due):
+            for ask in self.vehicles.due_requests(now, self.hub.members.passive_vehicles(), self.hub.may_ask):
                 # the autopilot acknowledges to these ids
                 self.vehicles.speak_as(self._config.identity.system, self.hub.sender.component.id)
                 self.hub.ask(ask)
@@ -216,7 +216,7 @@ class MavlinkHardware:
 
     def next_due(self, until: float = -math.inf) -> float:
         """When there is something to do. At once (-inf) after a frame that may change a status."""
-        if self.hub.needs_turn:
+        if self.hub.receiver.needs_turn:
             return AT_ONCE
         # compared without `min`: asked after each wake-up
         timer = self._timer_due if self._timer_due < self.tables.next_due else self.tables.next_due
@@ -259,31 +259,28 @@ class LinkSource:
 
     def receive(self, now: Instant, limit: int) -> int:
         """Read the pending input, and process its frames. Returns the number of datagrams."""
-        hub = self._hub
-        if hub.late:
+        receiver = self._hub.receiver
+        if receiver.late:
             self._hardware.receive_late(self._endpoint, now, limit)
             return MOST_AT_ONCE
-        if limit == 1 and hub.is_plain:
-            heard = hub.receive_one(self._endpoint, now)
-        else:
-            heard = hub.receive(self._endpoint, now, limit)
-        if heard:
-            self._take(heard, now)
-        return hub.pieces
+        received, number = receiver.receive(self._endpoint, now, limit)
+        if received:
+            self._process(received, now)
+        return number
 
-    def _take(self, heard: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
+    def _process(self, received: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
         hardware = self._hardware
         if self._endpoint.connections != self._connections:
             self._connections = self._endpoint.connections
-            hardware.vehicles.reconnected(self._hub.vehicles_on(self._endpoint), now.mono)
-            self._hub.reconnected(self._endpoint)
-        take, lag = hardware.vehicles.take, self._hub.lag
-        for frame, channel in heard:
+            hardware.vehicles.reconnected(self._hub.members.vehicles_on(self._endpoint), now.mono)
+            self._hub.members.reconnected(self._endpoint)
+        take, lag = hardware.vehicles.take, self._hub.receiver.lag
+        for frame, channel in received:
             vehicle = take(frame, now, channel, lag(frame))
             if vehicle is not None and vehicle.ids is not None:
-                self._hub.heard_vehicle(vehicle.ids, channel, now.mono)
+                self._hub.members.heard_vehicle(vehicle.ids, channel, now.mono)
         if hardware.observers:
-            hardware.observe(heard, now)
+            hardware.observe(received, now)
 
     def service(self, now: Instant) -> None:
         """Connect or reconnect."""

@@ -46,8 +46,8 @@ def _connection(endpoint: Endpoint) -> ConnectionMetrics:
         got.incompatible,
         got.garbage_bytes,
         endpoint.link.dropped,
-        endpoint.speech.said,
-        endpoint.speech.withheld,
+        endpoint.budget.sent,
+        endpoint.budget.withheld,
     )
 
 

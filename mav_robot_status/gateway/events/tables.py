@@ -231,7 +231,7 @@ class EventTables:
 
     def _begin(self, ids: Ids, vehicle: _Vehicle, now: float) -> None:
         """Start a transfer, when it is its turn on its link."""
-        channel = self._hub.channel_of(ids)
+        channel = self._hub.members.channel_of(ids)
         if vehicle.offer.crc in self._tables:
             self._share(ids, vehicle)
         elif channel is not None and channel.passive:
@@ -249,7 +249,7 @@ class EventTables:
         self, ids: Ids, vehicle: _Vehicle, download: TableDownload, tracked: TrackedVehicle, now: float
     ) -> Ask | None:
         """Send the next request of a transfer, if the link has room. Note its outcome."""
-        channel = self._hub.channel_of(ids)
+        channel = self._hub.members.channel_of(ids)
         if channel is None or channel.passive or tracked.handle.detail.link is not LinkState.CONNECTED:
             self._stop_hearing(vehicle)  # meanwhile another vehicle of the link may have its turn
             vehicle.due = now + LOST

@@ -16,7 +16,7 @@ from ...mavlink.framing import Parser
 from ...paced_log import PacedLog
 from .channel import NEVER, PEER_SILENCE, Channel
 from .fair_table import SHARE, FairTable
-from .send_budget import LIMIT, Speech
+from .send_budget import LIMIT, SendBudget
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,7 +54,7 @@ class Endpoint:
         self.passive: bool
         self.heartbeat_timeout: float | None
         """Seconds without a heartbeat after which a vehicle there counts as lost. None: the link does not say."""
-        self.speech = Speech()
+        self.budget = SendBudget()
         self._wanted: frozenset[int] | None = WANTED_IDS
         self._table: FairTable[Channel] = FairTable(MOST_SOURCES)
         self._channels = self._table.holders
@@ -96,13 +96,25 @@ class Endpoint:
         self.robot_status = not self.is_serial if config.robot_status is None else config.robot_status
         default = None if self.is_out else LIMIT
         self.speech_limit = (config.speech_limit or None) if config.speech_limit is not None else default
-        self.speech.renew(self.speech_limit)
+        self.budget.renew(self.speech_limit)
         wanted = None if keep_all else WANTED_IDS
         if wanted is not self._wanted:
             self._wanted = wanted
             for channel in self._channels.values():
                 channel.parser = _renewed(channel.parser, wanted)
             self._scratch = _renewed(self._scratch, wanted)
+
+    @property
+    def gets_statuses(self) -> bool:
+        """Whether statuses are sent on this link."""
+        return not self.passive and (self.is_out or self.robot_status)
+
+    def parse(self, data: bytes, source: Address, now: float) -> tuple[Channel | None, list[Frame]]:
+        """The channel of data that was received, and the frames in it. None: it is no MAVLink, or there is no room."""
+        channel = self.channel(source, now)
+        if channel is None:
+            return self.hear_stranger(data, source, now)
+        return channel, channel.parser.feed(data)
 
     def channel(self, source: Address, now: float) -> Channel | None:
         """The channel of one address. None for an address that sent no valid frame yet: see `hear_stranger`."""
@@ -278,8 +290,8 @@ class Endpoint:
             sum(got.unknown.values()),
             got.garbage_bytes,
             self.link.dropped,
-            self.speech.said,
-            self.speech.withheld,
+            self.budget.sent,
+            self.budget.withheld,
         )
 
 

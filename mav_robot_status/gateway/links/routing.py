@@ -42,7 +42,7 @@ from ...mavlink.wire import FORMATS
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from ...mavlink.framing import Frame, Values
+    from ...mavlink.framing import Frame
 
 SILENCE: Final = 300.0
 """Seconds after which a silent route is forgotten."""
@@ -65,8 +65,6 @@ MOST_DECISIONS: Final = 4096
 WHOLE: Final = -1  # instead of a component: the whole system
 EVERYBODY: Final = (0, 0)
 UNCHECKED: Final = (0, -1)  # a broadcast that teaches nothing
-BROADCASTS: Final = frozenset(CRC_EXTRA.keys() - TARGETS.keys() - {HEARTBEAT, *RADIO})
-"""The checked messages without a target. Most frames have these ids, and those of one sender all go the same way."""
 
 
 class Channel(Protocol):
@@ -98,8 +96,6 @@ class Router(Generic[C]):
         self._channels: tuple[C, ...] = ()
         self._decisions: dict[tuple[C, tuple[int, int], tuple[int, int]], tuple[C, ...]] = {}
         """By channel, sender and target."""
-        self._broadcast: dict[tuple[C, tuple[int, int]], tuple[C, ...]] = {}
-        """The same for BROADCASTS, by channel and sender: always a part of `_decisions`."""
         self._recent: dict[int, object] = {}
         """The frames of this window, by hash: the channel on which each arrived first, or when a copy showed that it
         also comes on another one."""
@@ -115,7 +111,7 @@ class Router(Generic[C]):
         """Set our own ids. Frames from them or addressed to them are not forwarded."""
         if self._own != own:
             self._own = frozenset(own)
-            self._forget_decisions()
+            self._decisions.clear()
 
     def heard(self, channel: C, system: int, component: int, now: float) -> None:
         """Learn from a frame with a good CRC that this sender is on this channel."""
@@ -127,17 +123,17 @@ class Router(Generic[C]):
                 self._forget_oldest()
             for ids in ((system, component), (system, WHOLE)):
                 self._where.setdefault(ids, Counter())[channel] += 1
-            self._forget_decisions()
+            self._decisions.clear()
         self._heard[route] = now
         self._heard.move_to_end(route)
 
-    def destinations(self, frame: Frame | Values, came_from: C, channels: tuple[C, ...], now: float) -> tuple[C, ...]:
+    def destinations(self, frame: Frame, came_from: C, channels: tuple[C, ...], now: float) -> tuple[C, ...]:
         """The channels that get a frame received on `came_from`. Learns its sender at least once in each window.
 
         `frame` comes from a parser that keeps `raw`. `channels` are all channels that may be sent to. Pass the same
         tuple while they are the same: decisions are cached for that long.
         """
-        message_id, ids, sequence, _, raw, _ = frame  # a third of the time of its attributes
+        message_id, ids, sequence, _, raw, _ = frame
         if now >= self._turn_at or len(self._recent) >= MOST_FRAMES:
             self._turn(now)
         sender, key = (came_from, ids), hash(raw)
@@ -148,12 +144,7 @@ class Router(Generic[C]):
             return ()
         if channels is not self._channels:
             self._channels = channels
-            self._forget_decisions()
-        if message_id in BROADCASTS:
-            decision = self._broadcast.get(sender)
-            if decision is None:
-                decision = self._broadcast[sender] = self._decided(came_from, ids, EVERYBODY, now)
-            return decision
+            self._decisions.clear()
         if message_id == HEARTBEAT:
             return self._heartbeat(ids, came_from, now)
         return self._decided(came_from, ids, _target(message_id, raw), now)
@@ -166,13 +157,9 @@ class Router(Generic[C]):
             if target is not UNCHECKED:
                 self.heard(came_from, *ids, now)
             if len(self._decisions) >= MOST_DECISIONS:
-                self._forget_decisions()
+                self._decisions.clear()
             decision = self._decisions[key] = self._decide(came_from, ids, target, self._heard, now - PRESENT)
         return decision
-
-    def _forget_decisions(self) -> None:
-        self._decisions.clear()
-        self._broadcast.clear()
 
     def decided(self, frame: Frame, came_from: C) -> tuple[C, ...]:
         """The channels that `destinations` gave for this frame or an earlier one like it; none if it is forgotten."""
@@ -262,7 +249,7 @@ class Router(Generic[C]):
         self._newest = {}
         self._repeated = {}
         self._turn_at = now + WINDOW
-        self._forget_decisions()
+        self._decisions.clear()
         while self._heard and now - next(iter(self._heard.values())) > SILENCE:
             self._forget_oldest()
 

@@ -1,4 +1,4 @@
-"""What we say on one link without being asked. It is bounded, shared fairly by all vehicles, and counted.
+"""What is sent on one link without being asked: bounded, shared fairly by all vehicles, and counted.
 
 A heartbeat or a status beyond the bound waits. A newer message of the same kind about the same vehicle replaces it, and
 keeps its place in the queue. So no vehicle starves, and nothing waits that is out of date.
@@ -33,13 +33,13 @@ class Waiting(NamedTuple):
     """The system id of the vehicle that it is about."""
 
 
-class Speech:
-    """The allowance of one link. It is renewed once a second, in `renew`."""
+class SendBudget:
+    """The budget of one link. It is renewed once a second, in `renew`."""
 
     def __init__(self) -> None:
         self.limit: float | None = None
         """Bytes a second. None: no limit."""
-        self.said = 0
+        self.sent = 0
         """Bytes sent without being asked."""
         self.withheld = 0
         """Messages that were replaced or dropped while they waited."""
@@ -62,21 +62,21 @@ class Speech:
         """Whether more than so many bytes may be sent in this second."""
         return self._left > size
 
-    def in_turn(self, things: Sequence[T], say: Callable[[T], int]) -> None:
-        """Send something about each of these things, in turn over several seconds if the allowance is too small.
+    def in_turn(self, things: Sequence[T], send: Callable[[T], int]) -> None:
+        """Send something about each of these things, in turn over several seconds if the budget is too small.
 
-        `say` sends, and returns the number of bytes.
+        `send` sends, and returns the number of bytes.
         """
         for done in range(len(things)):
             if not self.has_room:
                 self._turn += done
                 self.withheld += len(things) - done
                 return
-            self.count(say(things[(self._turn + done) % len(things)]))
+            self.count(send(things[(self._turn + done) % len(things)]))
 
     def count(self, size: int) -> None:
         """Bytes were sent without being asked."""
-        self.said += size
+        self.sent += size
         self._left -= size
 
     def count_asked(self, size: int) -> None:

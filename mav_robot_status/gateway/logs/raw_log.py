@@ -14,7 +14,7 @@ from ...mavlink.definitions import CRC_EXTRA, Heartbeat, SystemTime
 from ...mavlink.framing import STAMP_SIZE, Parser
 
 if TYPE_CHECKING:
-    from ...mavlink.framing import Values
+    from ...mavlink.framing import Frame
 
 FIRST_FRAMES: Final = 1 << 14
 """Bytes at the start of a file that show whether time stamps precede the frames."""
@@ -62,14 +62,13 @@ class AutopilotClock:
         boots = (getattr(f.message, "time_boot_ms", 0) for f in frames if f.ids == self._ids)
         self.stamp = self._start + next(filter(None, boots), 0) * 1000
 
-    def stamped(self, frame: Values) -> Values:
+    def stamped(self, frame: Frame) -> Frame:
         """The frame with its time."""
-        message_id, ids, sequence, message, raw, _ = frame
-        boot_ms = getattr(message, "time_boot_ms", None) if ids == self._ids else None
+        boot_ms = getattr(frame.message, "time_boot_ms", None) if frame.ids == self._ids else None
         if boot_ms:
             stamp = self._start + boot_ms * 1000
             if stamp < self.stamp - SMALL_STEP_US:
                 self._start += self.stamp - stamp
                 stamp = self.stamp
             self.stamp = max(self.stamp, stamp)
-        return message_id, ids, sequence, message, raw, self.stamp
+        return frame._replace(stamp=self.stamp)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ...links.log import Stamped
-    from ...mavlink.framing import Values
+    from ...mavlink.framing import Frame
 
 
 SEARCHED: Final = 16 << 20
@@ -44,10 +44,10 @@ class Recording:
         """Raises UsageError at the end if the log held no MAVLink."""
         return timed(chain.from_iterable(self._frames()), self._last, self.counts)
 
-    def _frames(self) -> Iterator[list[Values]]:
+    def _frames(self) -> Iterator[list[Frame]]:
         clock = self._clock
         for block in self._reader.blocks():
-            found = self._parser.walk(block)
+            found = self._parser.feed(block)
             yield found if clock is None else [clock.stamped(frame) for frame in found]
             if self._reader.given > SEARCHED and not self._is_mavlink():
                 break

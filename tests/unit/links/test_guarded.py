@@ -228,7 +228,7 @@ def test_a_link_that_raises_does_not_end_the_gateway(
     hub = LinkHub(Config(links=(LinkConfig("faulty:x"), LinkConfig("udpout:127.0.0.1:9"))), lambda: now)
     Faulty.fails = method
     for endpoint in hub.endpoints:
-        hub.receive(endpoint, now)
+        hub.receiver.receive(endpoint, now)
     hub.speak((), now.mono)
     hub.close()
     assert opened[0].closed == 1

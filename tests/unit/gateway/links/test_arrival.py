@@ -171,7 +171,7 @@ class Gateway:
         self.hardware.read(now)
 
     def look_late(self, since: Instant, now: Instant) -> None:
-        self.hardware.hub.pause(since, now, stalled=True)
+        self.hardware.hub.receiver.pause(since, now, stalled=True)
         self.look(now)
 
     @property
@@ -209,7 +209,7 @@ def test_time_does_not_go_back_for_a_datagram_that_was_left_for_a_later_read() -
     link = FakeDatedLink([Received(beat(True), "a")], old, [Dated(beat(False), "a", stamp(1.0))], stream=False)
     gate = Gateway(link)
     gate.look(SINCE)
-    gate.hardware.hub.pause(SINCE, NOW, stalled=True)
+    gate.hardware.hub.receiver.pause(SINCE, NOW, stalled=True)
     for endpoint in gate.hardware.hub.endpoints:
         LinkSource(endpoint, gate.hardware).receive(NOW, BATCH)
     gate.hardware.read(NOW)
@@ -224,7 +224,7 @@ def test_a_frame_that_waits_does_not_bring_back_a_vehicle_whose_link_is_closed()
     gate = Gateway(kept, closed)
     gate.look(SINCE)
     assert gate.state == (LinkState.CONNECTED, 0)
-    gate.hardware.hub.pause(SINCE, NOW, stalled=True)
+    gate.hardware.hub.receiver.pause(SINCE, NOW, stalled=True)
     LinkSource(gate.hardware.hub.endpoints[1], gate.hardware).receive(NOW, 1024)
     one = Config(links=(LinkConfig("udpin:127.0.0.1:0"),), requests="none", vehicles=(VehicleConfig(1, 1),))
     gate.hardware.change(one)

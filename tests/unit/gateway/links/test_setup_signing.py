@@ -47,7 +47,7 @@ class Forwarding:
         link.send(b"x")  # binds its socket to a port
         sender.sendto(data, sender.recvfrom(100)[1])
         assert select.select([link], [], [], 5)[0]
-        self.hub.receive(endpoint, self.now)
+        self.hub.receiver.receive(endpoint, self.now)
         arrived = []
         with suppress(BlockingIOError):
             while True:

@@ -11,6 +11,7 @@ from mav_robot_status.gateway.logs.raw_log import AutopilotClock, is_raw
 from mav_robot_status.gateway.logs.recorded_log import Recording
 from mav_robot_status.mavlink.definitions import Attitude, Heartbeat, SystemTime
 from mav_robot_status.mavlink.encode import encode
+from mav_robot_status.mavlink.framing import Frame
 
 START = 1_800_000_000_000_000
 HEARTBEAT = Heartbeat(0, 10, 3, 65, 4, 3)
@@ -68,5 +69,5 @@ def test_the_clock_of_another_component_does_not_count(tmp_path: Path) -> None:
 
 def test_time_goes_on_after_a_restart_of_the_autopilot() -> None:
     clock = AutopilotClock(sent(HEARTBEAT) + sent(attitude(60_000)))
-    values = [(30, (1, 1), 0, attitude(boot_ms), b"", 0) for boot_ms in (60_000, 61_000, 1_000, 3_000)]
-    assert [clock.stamped(frame)[-1] // 1000 for frame in values] == [60_000, 61_000, 61_000, 63_000]
+    values = [Frame(30, (1, 1), 0, attitude(boot_ms), b"") for boot_ms in (60_000, 61_000, 1_000, 3_000)]
+    assert [clock.stamped(frame).stamp // 1000 for frame in values] == [60_000, 61_000, 61_000, 63_000]

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from mav_robot_status.gateway.links.send_budget import ASKED_LIMIT, Speech
-from mav_robot_status.gateway.links.sender import Sender
+from mav_robot_status.gateway.links.send_budget import ASKED_LIMIT, SendBudget
+from mav_robot_status.gateway.links.sending import Sender
 from mav_robot_status.mavlink.definitions import RobotStatus
 from mav_robot_status.testing import ManualClock
 
@@ -18,8 +18,8 @@ class Link:
     is_out = True
 
     def __init__(self, limit: float | None) -> None:
-        self.speech = Speech()
-        self.speech.renew(limit)
+        self.budget = SendBudget()
+        self.budget.renew(limit)
 
 
 class End:
@@ -61,18 +61,18 @@ def test_a_status_that_waits_is_not_sent_after_a_newer_one_that_the_peer_has_ask
     assert sent == []
     end.interval = 60.0
     sender.send_unasked(end, status(1), 1)
-    end.endpoint.speech.renew(None)
-    sender._send_waiting(end.endpoint.speech)
+    end.endpoint.budget.renew(None)
+    sender._send_waiting(end.endpoint.budget)
     assert sent == [1]
 
 
 def test_a_status_beyond_what_peers_may_ask_for_waits(sender: Sender, sent: list[int]) -> None:
     end: Any = End(0.0)
     end.interval = 60.0
-    end.endpoint.speech.count_asked(int(ASKED_LIMIT) + 1)
+    end.endpoint.budget.count_asked(int(ASKED_LIMIT) + 1)
     sender.send_unasked(end, status(0), 1)
     sender.send_unasked(end, status(1), 1)
     assert sent == []
-    end.endpoint.speech.renew(1000.0)
-    sender._send_waiting(end.endpoint.speech)
+    end.endpoint.budget.renew(1000.0)
+    sender._send_waiting(end.endpoint.budget)
     assert sent == [1]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...interface import LinkState, TriState
 from ...links.record import TlogWriter
 from ...mavlink.component import DEFAULT_SYSTEM, Component
-from .send_budget import Speech, Waiting
+from .send_budget import SendBudget, Waiting
 from .signing_policy import SigningPolicy
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ...clock import Instant
     from ...config import Config, SigningConfig
     from ...hardware.mavlink.vehicle import TrackedVehicle
+    from ...mavlink.framing import Frame
     from .channel import Channel
     from .endpoint import Endpoint
 
@@ -73,24 +74,24 @@ class Sender:
         return self._send_frame(channel, self.component.heartbeat(system, in_error, channel.encoders))
 
     def send_unasked(self, channel: Channel, message: NamedTuple, system: int) -> None:
-        """Send a message within the allowance of the link, or later."""
-        speech = channel.endpoint.speech
+        """Send a message within the budget of the link, or later."""
+        budget = channel.endpoint.budget
         key = channel, type(message), getattr(message, "subject_component", 0), getattr(message, "name", b""), system
-        if channel.interval is not None and speech.has_room_for_asked:  # the peer has asked for it
-            speech.forget(key)
-            speech.count_asked(self.send(channel, message, system))
+        if channel.interval is not None and budget.has_room_for_asked:  # the peer has asked for it
+            budget.forget(key)
+            budget.count_asked(self.send(channel, message, system))
             return
-        speech.wait(key, Waiting(channel, message, system))
-        self._send_waiting(speech)
+        budget.wait(key, Waiting(channel, message, system))
+        self._send_waiting(budget)
 
-    def _send_waiting(self, speech: Speech) -> None:
-        while (waiting := speech.next_waiting()) is not None:
+    def _send_waiting(self, budget: SendBudget) -> None:
+        while (waiting := budget.next_waiting()) is not None:
             channel, message, system = waiting
             if channel.endpoint.is_out or system in channel.systems:
-                speech.count(self.send(channel, message, system))
+                budget.count(self.send(channel, message, system))
 
     def speak(self, endpoints: Iterable[Endpoint], vehicles: Iterable[TrackedVehicle], beats: bool) -> None:
-        """Renew the allowances; send our heartbeats, then what waits. Called once a second.
+        """Renew the budgets; send our heartbeats for these vehicles, then what waits. Called once a second.
 
         A heartbeat for a system goes to the channels on which its vehicles are heard, and to the outs. On a link that
         must send first there is one even without a vehicle, unless it is `quiet`.
@@ -98,17 +99,17 @@ class Sender:
         self.component.pass_second()
         in_error: dict[int, bool] = {}
         for tracked in vehicles:
-            if tracked.ids is not None and speaks_for(tracked):
+            if tracked.ids is not None:
                 system = tracked.ids[0]
                 in_error[system] = in_error.get(system, False) or tracked.handle.status.in_error is TriState.TRUE
         for endpoint in endpoints:
-            speech = endpoint.speech
-            speech.renew(endpoint.speech_limit)
+            budget = endpoint.budget
+            budget.renew(endpoint.speech_limit)
             if endpoint.passive:
                 continue
             if beats:
-                speech.in_turn(list(self._beats(endpoint, in_error)), lambda beat: self.send_heartbeat(*beat))
-            self._send_waiting(speech)
+                budget.in_turn(list(self._beats(endpoint, in_error)), lambda beat: self.send_heartbeat(*beat))
+            self._send_waiting(budget)
 
     def _beats(self, endpoint: Endpoint, in_error: Mapping[int, bool]) -> Iterator[tuple[Channel, int, bool]]:
         """The heartbeats that are due on a link: channel, system, and whether a vehicle of the system is in error."""
@@ -121,6 +122,12 @@ class Sender:
             if not ours and endpoint.must_speak and not endpoint.is_out and not channel.quiet:
                 ours = {DEFAULT_SYSTEM: False}
             yield from ((channel, own, faulty) for own, faulty in ours.items())
+
+    def record(self, frames: Iterable[Frame], now: Instant) -> None:
+        """Record received frames, if that is configured."""
+        if self.recorder is not None:
+            for frame in frames:
+                self.recorder.write(now.unix_us, frame.raw)
 
     def _send_frame(self, channel: Channel, frame: bytes) -> int:
         if self.signing_policy is not None or self.recorder is not None:

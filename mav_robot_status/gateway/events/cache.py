@@ -15,6 +15,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from ...mavlink.ftp.metadata import MOST_TABLE, XZ
+from ...user_files import cache_folder
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,11 +33,7 @@ NAME: Final = re.compile(r"[0-9A-F]{8}\.json\.xz")
 
 def default_folder(environment: Mapping[str, str] = os.environ) -> str:
     """Where the tables are."""
-    home = environment.get("XDG_CACHE_HOME", "")
-    if not os.path.isabs(home):  # a relative path is invalid: https://specifications.freedesktop.org/basedir-spec
-        home = os.path.expanduser("~/.cache")
-    folder = environment.get("CACHE_DIRECTORY", "").split(":")[0] or os.path.join(home, "mav-robot-status")
-    return os.path.join("/", folder, "events")  # never relative to the current folder, if the home is unknown
+    return os.path.join(cache_folder(environment), "events")
 
 
 class EventTableCache:

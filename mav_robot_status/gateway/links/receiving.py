@@ -60,8 +60,7 @@ class Receiver:
     def receive(self, endpoint: Endpoint, now: Instant, limit: int = BATCH) -> tuple[Received, int]:
         """Receive on a link. Returns the frames, and the datagrams read: for a stream, its bytes divided by STREAMED.
 
-        Reads at most `limit` datagrams of USUAL bytes, or BATCH pieces of a stream. A limit of 1 makes a single system
-        call.
+        Reads at most `limit` datagrams of USUAL bytes, or BATCH pieces of a stream.
         """
         received: Received = []
         link = endpoint.link

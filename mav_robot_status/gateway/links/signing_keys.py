@@ -8,16 +8,15 @@ import re
 import zlib
 from hashlib import sha256
 from pathlib import Path
-from stat import S_IRGRP, S_IROTH, S_IWGRP, S_IWOTH
 from typing import Final
 
 from ...errors import UsageError
 from ...mavlink.signing import MAX_STAMP, MAX_STREAMS, UNITS_PER_SECOND, Stamps, stamp_at
+from ...user_files import read_secret, state_folder
 from .state_file import StateFile
 
 MAX_BYTES: Final = 4096
 """The size limit of a key file."""
-OF_OTHERS: Final = S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH
 PREFIX: Final = "passphrase:"
 FORM: Final = f"write one line, 64 hexadecimal digits or '{PREFIX} ...'"
 HEX: Final = re.compile("[0-9a-fA-F]{64}")
@@ -36,20 +35,7 @@ def read_key(path: str | os.PathLike[str]) -> bytes:
     The key of a passphrase is its SHA-256, as in MAVProxy and Mission Planner. Blanks around it are ignored. Raises
     UsageError; the message never contains the contents of the file.
     """
-    name = os.path.expanduser(path)
-    try:
-        with open(name, "rb") as file:
-            mode = os.fstat(file.fileno()).st_mode
-            if mode & OF_OTHERS:
-                raise UsageError(f"{name}: other users can read or change this signing key: chmod 600 {name}")
-            data = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise UsageError(f"{name}: cannot read the signing key: {reason}") from None
-    return _key(data, name)
-
-
-def _key(data: bytes, name: str) -> bytes:
+    name, data = read_secret(path, "signing key", MAX_BYTES + 1)
     try:
         text = data.decode("utf-8-sig").strip()
     except UnicodeDecodeError:
@@ -72,12 +58,8 @@ def stamp_path(key: bytes) -> Path:
 
     The name differs for each key, and does not reveal the key. The stamps that were heard are in a file beside it.
     """
-    home = os.environ.get("XDG_STATE_HOME", "")
-    if not os.path.isabs(home):  # a relative path is invalid: https://specifications.freedesktop.org/basedir-spec
-        home = os.path.expanduser("~/.local/state")
-    folder = os.environ.get("STATE_DIRECTORY", "").split(":")[0] or os.path.join(home, "mav-robot-status")
     name = sha256(b"stamp of " + sha256(key).digest()).hexdigest()[:16]
-    return Path("/", folder, f"{name}.stamp")  # never relative to the current folder, if the home is unknown
+    return Path(state_folder(), f"{name}.stamp")
 
 
 class StampStore:

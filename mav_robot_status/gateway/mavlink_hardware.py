@@ -72,7 +72,12 @@ class MavlinkHardware:
         self.hub = LinkHub(config if opens else Config(), clock, observers)
         self.vehicles = robot_hw(config, self.hub.members.beliefs, self._event_table)
         self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
-        self.tables = EventTables(self.hub, self._use_table, parse, cache=EventTableCache(default_folder()))
+        self.tables = EventTables(
+            self.hub,
+            lambda ids, table: self.vehicles.use_event_table(ids, table),  # `renew` makes other vehicles
+            parse,
+            cache=EventTableCache(default_folder()),
+        )
         self.changed = False
         self.observers = observers
         self._waiting: list[tuple[Instant, Frame, Channel]] = []
@@ -102,11 +107,7 @@ class MavlinkHardware:
         """Whether the tables of PX4's events are looked for, in the cache and on the vehicles."""
         self.tables.wanted = wants_tables(config)
         self.vehicles.ask_for_tables(self.tables.wanted)
-        self.vehicles.hear_file = self.tables.heard
-
-    def _use_table(self, ids: tuple[int, int], table: EventTable) -> None:
-        """A vehicle has this table of events."""
-        self.vehicles.use_event_table(ids, table)
+        self.vehicles.hear_file = self.tables.on_message
 
     # reload
 

@@ -48,7 +48,6 @@ ROOM: Final = 0.2  # s until a link without room, or whose turn it is not, is lo
 LOST: Final = 1.0  # s until a lost vehicle is looked at again
 MOST_TABLES: Final = 8
 """Tables kept in memory, for the other vehicles of a fleet."""
-"""Bytes of an unpacked table."""
 
 Ids = tuple[int, int]
 
@@ -89,7 +88,7 @@ class _Vehicle:
 
 
 class EventTables:
-    """The tables of the vehicles of one hub. `heard` and `due` are called by the loop; neither waits nor raises."""
+    """The tables of the vehicles of one hub. The loop calls `on_message` and `due`; neither waits nor raises."""
 
     def __init__(
         self,
@@ -128,12 +127,12 @@ class EventTables:
 
     # received
 
-    def heard(self, tracked: TrackedVehicle, received: Any, now: float) -> None:
-        """Process COMPONENT_METADATA or FILE_TRANSFER_PROTOCOL of a vehicle, from its selected way."""
+    def on_message(self, tracked: TrackedVehicle, received: Any, now: float) -> None:
+        """Process COMPONENT_METADATA or FILE_TRANSFER_PROTOCOL of a vehicle, from its selected channel."""
         if tracked.ids is None or tracked.state is None:
             return
         if type(received) is FileTransferProtocol:
-            self._take(tracked.ids, received, now)
+            self._on_answer(tracked.ids, received, now)
         elif type(received) is ComponentMetadata and self.wanted and METADATA in tracked.state.profile.requests.once:
             self._offered(tracked.ids, Offer(received.file_crc, text(received.uri)), now)
 
@@ -150,7 +149,7 @@ class EventTables:
         self._vehicles[ids] = _Vehicle(offer, due)
         self.next_due = min(self.next_due, due)
 
-    def _take(self, ids: Ids, received: FileTransferProtocol, now: float) -> None:
+    def _on_answer(self, ids: Ids, received: FileTransferProtocol, now: float) -> None:
         """Process an answer of a file server, if it is for us."""
         vehicle = self._vehicles.get(ids)
         own = self._hub.sender.component
@@ -188,7 +187,10 @@ class EventTables:
         return asks
 
     def _step(self, ids: Ids, vehicle: _Vehicle, tracked: TrackedVehicle, now: float) -> Ask | None:
-        if vehicle.stage is _Stage.OFFERED:
+        if vehicle.stage in (_Stage.OFFERED, _Stage.WAITING) and vehicle.offer.crc in self._tables:
+            self._tell(ids, "it uses the table of events of another vehicle")
+            self._give(ids, vehicle, self._tables[vehicle.offer.crc])
+        elif vehicle.stage is _Stage.OFFERED:
             self._look_up(ids, vehicle, now)
         elif vehicle.stage is _Stage.WAITING:
             self._begin(ids, vehicle, now)
@@ -197,12 +199,10 @@ class EventTables:
         return None
 
     def _look_up(self, ids: Ids, vehicle: _Vehicle, now: float) -> None:
-        """Look for a table in memory and in the cache."""
+        """Look for a table in the cache."""
         crc, cache = vehicle.offer.crc, self.cache
         vehicle.started = now
-        if crc in self._tables:
-            self._share(ids, vehicle)
-        elif crc == 0 or cache is None:
+        if crc == 0 or cache is None:
             vehicle.stage = _Stage.WAITING
         else:
             vehicle.stage, vehicle.due = _Stage.READING, math.inf
@@ -224,17 +224,10 @@ class EventTables:
             self._keep(vehicle.offer.crc, table)
             self._give(ids, vehicle, table)
 
-    def _share(self, ids: Ids, vehicle: _Vehicle) -> None:
-        """Another vehicle has brought the table."""
-        self._tell(ids, "it uses the table of events of another vehicle")
-        self._give(ids, vehicle, self._tables[vehicle.offer.crc])
-
     def _begin(self, ids: Ids, vehicle: _Vehicle, now: float) -> None:
         """Start a transfer, when it is its turn on its link."""
         channel = self._hub.members.channel_of(ids)
-        if vehicle.offer.crc in self._tables:
-            self._share(ids, vehicle)
-        elif channel is not None and channel.passive:
+        if channel is not None and channel.passive:
             vehicle.stage, vehicle.due = _Stage.GIVEN_UP, math.inf
             self.given_up[ids] = "nothing may be sent on its link"
         elif channel is None or channel.endpoint in self._busy or vehicle.offer.crc in self._coming:

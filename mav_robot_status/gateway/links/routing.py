@@ -230,7 +230,7 @@ class Router(Generic[C]):
                 return True
             if now - first < AGAIN:
                 return True
-            recent = None  # its sender repeats itself on two ways
+            recent = None  # its sender repeats itself on two channels
         constant = self._newest.get(sender) == sequence
         self._newest[sender] = sequence
         self._recent[key] = came_from

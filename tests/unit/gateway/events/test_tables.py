@@ -145,7 +145,7 @@ def test_offers_that_change_all_the_time_are_followed_once_a_minute(site: Callab
     assert tracked is not None
     before = transfers(vehicle)
     for number in range(100):
-        here.tables.heard(tracked, ComponentMetadata(0, number + 1, BAD.uri.encode()), here.clock.now().mono)
+        here.tables.on_message(tracked, ComponentMetadata(0, number + 1, BAD.uri.encode()), here.clock.now().mono)
         here.run(0.1)
     assert transfers(vehicle) == before
     assert len(here.tables.offers) == 1
@@ -159,7 +159,9 @@ def test_nothing_is_asked_where_nothing_may_be(options: dict[str, Any], site: Ca
     assert vehicle.heard("COMMAND_LONG") == []
     tracked = here.hardware.vehicles.find(1, 1)
     assert tracked is not None
-    here.tables.heard(tracked, ComponentMetadata(0, FILES.crc, FILES.uri.encode()), here.clock.now().mono)  # overheard
+    here.tables.on_message(
+        tracked, ComponentMetadata(0, FILES.crc, FILES.uri.encode()), here.clock.now().mono
+    )  # overheard
     here.run(10)
     assert transfers(vehicle) == 0
 

@@ -145,7 +145,7 @@ class MavlinkHardware:
         for at, heard in self.hub.receiver.receive_late(endpoint, now, limit):
             self._waiting += [(at, frame, channel) for frame, channel in heard]
 
-    def _take_waiting(self) -> None:
+    def _process_waiting(self) -> None:
         """Process the frames of all links in the order of their arrival, as if they had been read at once.
 
         Time does not go back: a frame older than the last `read` is left out.
@@ -178,7 +178,7 @@ class MavlinkHardware:
         hub, vehicles = self.hub, self.vehicles
         hub.receiver.needs_turn = False
         if self._waiting:
-            self._take_waiting()
+            self._process_waiting()
         self._read_at = now.mono
         vehicles.read(now)
         if vehicles.changed:

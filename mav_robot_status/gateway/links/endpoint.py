@@ -60,11 +60,7 @@ class Endpoint:
         self._channels = self._table.holders
         self._peers: FairTable[Channel] = FairTable(MOST_PEERS)
         """The peers of a link on which several speak."""
-        self._left_out: set[Address] = set()
-        """The addresses that got no channel since the last line in the log, as far as they are counted."""
-        self._unanswered: set[Address] = set()
-        """The same for those that got no place among the peers."""
-        self._tell_left_out, self._tell_unanswered = PacedLog(log), PacedLog(log)
+        self._tell_refused = PacedLog(log), PacedLog(log)
         self._scratch = Parser(self._wanted)
         """Parses the first bytes of an address. Only a valid frame gives it a channel."""
         self._stranger: Address = None
@@ -176,8 +172,6 @@ class Endpoint:
             return self._only
         room, gone = self._table.make_room(source, now)
         if not room:
-            if len(self._left_out) < MOST_SOURCES:
-                self._left_out.add(source)
             return None
         channel = Channel(self, source, self._scratch)
         channel.is_peer = False
@@ -207,8 +201,6 @@ class Endpoint:
         if room:
             self._peers.add(channel)
             channel.is_peer = True
-        elif len(self._unanswered) < MOST_SOURCES:
-            self._unanswered.add(channel.source)
         return room
 
     def peers(self) -> Iterator[Channel]:
@@ -240,20 +232,18 @@ class Endpoint:
                 if self.listens:
                     channel.is_peer, channel.interval = False, None
                     self._peers.remove(channel.source)
-        self._log_left_out(now)
+        self._log_refused(now)
 
-    def _log_left_out(self, now: float) -> None:
+    def _log_refused(self, now: float) -> None:
         """Log how many have no channel, and how many are no peers, because there are too many."""
-        for addresses, tell, what, most in (
-            (self._left_out, self._tell_left_out, "not heard", MOST_SOURCES),
-            (self._unanswered, self._tell_unanswered, "neither answered nor forwarded", MOST_PEERS),
-        ):
-            if addresses and now >= tell.due:
-                number = f"{len(addresses)} sender{'s are' if len(addresses) > 1 else ' is'} {what}"
-                room = f"there is room for {most}, and for {most // SHARE} at one address"
-                line = f"{self.link.text}: {number}, {_where(next(iter(addresses)))} for one: {room}"
+        tables = (self._table, "not heard"), (self._peers, "neither answered nor forwarded")
+        for (table, what), tell in zip(tables, self._tell_refused, strict=True):
+            if table.refused and now >= tell.due:
+                number = f"{len(table.refused)} sender{'s are' if len(table.refused) > 1 else ' is'} {what}"
+                room = f"there is room for {table.most}, and for {table.most // SHARE} at one address"
+                line = f"{self.link.text}: {number}, {_where(next(iter(table.refused)))} for one: {room}"
                 tell(logging.WARNING, now, line)
-                addresses.clear()
+                table.refused.clear()
 
     def totals(self) -> Counters:
         """The counters of all channels, added up."""

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 SHARE: Final = 4
 """One host holds at most the places divided by this."""
+MOST_REFUSED: Final = 1024
+"""The most addresses without a place that are counted."""
 LOOK_AGAIN: Final = 0.5
 """Seconds without another search after one that found nobody who gives way. A search passes every entry."""
 
@@ -34,11 +36,13 @@ class FairTable(Generic[H]):
     """Holders by address: at most `most`, of one host at most a quarter. Times are monotonic seconds."""
 
     def __init__(self, most: int) -> None:
-        self._most = most
+        self.most = most
         self.holders: OrderedDict[Address, H] = OrderedDict()
         """By address; about the least recently used first, if the owner moves the used ones to the end."""
         self._places: Counter[Hashable] = Counter()
         """The places of each host."""
+        self.refused: set[Address] = set()
+        """The addresses that got no place, as far as they are counted. The owner clears it."""
         self._search_at: dict[Hashable, float] = {}
         """When to search again for a holder that gives way: of a host that has its share, or of all (None)."""
 
@@ -60,22 +64,27 @@ class FairTable(Generic[H]):
         its share.
         """
         host = _host(source)
-        if self._places[host] >= max(1, self._most // SHARE):
+        if self._places[host] >= max(1, self.most // SHARE):
             among = host
-        elif len(self.holders) >= self._most:
+        elif len(self.holders) >= self.most:
             among = None
         else:
             return True, None
         if now < self._search_at.get(among, now):
-            return False, None
+            return self._refuse(source)
         gone = self._first_that_gives_way(among, now)
         if gone is None:
             if len(self._search_at) > SHARE:  # hosts that had their share
                 self._search_at.clear()
             self._search_at[among] = now + LOOK_AGAIN
-            return False, None
+            return self._refuse(source)
         self.remove(gone.source)
         return True, gone
+
+    def _refuse(self, source: Address) -> tuple[bool, None]:
+        if len(self.refused) < MOST_REFUSED:
+            self.refused.add(source)
+        return False, None
 
     def _first_that_gives_way(self, host: Hashable | None, now: float) -> H | None:
         """Those passed are moved to the end: so a flood of newcomers does not pass the same ones each time."""

@@ -142,8 +142,8 @@ class MavlinkHardware:
 
     def receive_late(self, endpoint: Endpoint, now: Instant, limit: int) -> None:
         """Receive on a link whose input may be old."""
-        for at, heard in self.hub.receiver.receive_late(endpoint, now, limit):
-            self._waiting += [(at, frame, channel) for frame, channel in heard]
+        for at, received in self.hub.receiver.receive_late(endpoint, now, limit):
+            self._waiting += [(at, frame, channel) for frame, channel in received]
 
     def _process_waiting(self) -> None:
         """Process the frames of all links in the order of their arrival, as if they had been read at once.
@@ -163,10 +163,10 @@ class MavlinkHardware:
             if self.observers:
                 self.observe([(frame, channel)], at)
 
-    def observe(self, heard: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
+    def observe(self, received: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
         """Pass the frames of vehicles to the observers."""
         for observer in self.observers:
-            for frame, channel in heard:
+            for frame, channel in received:
                 vehicle = self.vehicles.find(*frame.ids)
                 if vehicle is not None and vehicle.belief.channel is channel:
                     observer.on_frame(frame, now)

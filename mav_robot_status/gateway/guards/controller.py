@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from .publisher import Guard
+from . import Guard
 
 if TYPE_CHECKING:
     from ...clock import Instant

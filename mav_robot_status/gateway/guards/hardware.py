@@ -11,8 +11,8 @@ import math
 import time
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from . import Guard
 from .handle_check import HandleCheck
-from .publisher import Guard
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -1,47 +1,16 @@
-"""Contains the exceptions of third-party parts: an exception stops the part that raised it, and nothing else."""
+"""Contains exceptions of third parties' publishers."""
 
 from __future__ import annotations
 
-import logging
 import math
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING
 
 from ...errors import MavRobotStatusError
+from . import Guard
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from ...clock import Instant
     from ...interface import Publisher, RobotStatusMsg
-
-log = logging.getLogger(__name__)
-
-T = TypeVar("T")
-
-FOR_THE_USER: Final = (MavRobotStatusError, BrokenPipeError)
-"""Exceptions that a controller may pass on: an output failed permanently, the reader of standard output is gone."""
-
-
-class Guard:
-    """Calls the functions of one part. The first exception is logged; after it the part is not called again."""
-
-    def __init__(self, what: str, through: tuple[type[Exception], ...] = FOR_THE_USER) -> None:
-        self.what = what
-        self.broken = False
-        self._through = through
-
-    def call(self, default: T, function: Callable[..., T], *arguments: object) -> T:
-        """The result of the function; `default` after the first exception."""
-        if self.broken:
-            return default
-        try:
-            return function(*arguments)
-        except self._through:
-            raise
-        except Exception:  # third-party code may raise anything
-            self.broken = True
-            log.exception("%s failed and is stopped; all other parts continue", self.what)
-            return default
 
 
 class GuardedPublisher:

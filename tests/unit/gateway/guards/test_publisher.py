@@ -7,7 +7,8 @@ import pytest
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import LinkError
-from mav_robot_status.gateway.guards.publisher import Guard, GuardedPublisher
+from mav_robot_status.gateway.guards import Guard
+from mav_robot_status.gateway.guards.publisher import GuardedPublisher
 from mav_robot_status.interface import Detail, RobotStatus, RobotStatusMsg
 
 NOW = Instant(0.0, 0)

@@ -84,8 +84,6 @@ class MavlinkHardware:
         """Frames that arrived before they were read, with their times. The next `read` takes them in order."""
         self._read_at = -math.inf
         self._heartbeat_due = AT_ONCE
-        self._timer_due = AT_ONCE
-        """The first of `_heartbeat_due` and `_silent_at`."""
         self._silent_at = clock().mono + FIRST_SILENCE
         self._configure(config)
 
@@ -97,7 +95,6 @@ class MavlinkHardware:
     def _configure(self, config: Config) -> None:
         self._config = config
         self.vehicles.asks = config.requests == "missing" and not all(link.passive for link in config.links)
-        self._timer_due = AT_ONCE
         self._want_tables(config)
         if publishes(config, "mavlink"):
             self.hub.receiver.commands.offered |= {ROBOT_STATUS}
@@ -157,14 +154,15 @@ class MavlinkHardware:
                 continue
             if vehicles.deadline < at.mono:
                 vehicles.read(at)
-            vehicle = vehicles.take(frame, at, channel, self.hub.receiver.lag(frame))
-            if vehicle is not None and vehicle.ids is not None:
-                self.hub.members.heard_vehicle(vehicle.ids, channel, at.mono)
-            if self.observers:
-                self.observe([(frame, channel)], at)
+            self.process([(frame, channel)], at)
 
-    def observe(self, received: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
-        """Pass the frames of vehicles to the observers."""
+    def process(self, received: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
+        """Process frames that arrived at `now`. The observers get those of vehicles."""
+        hub, take = self.hub, self.vehicles.take
+        for frame, channel in received:
+            vehicle = take(frame, now, channel, hub.receiver.lag(frame))
+            if vehicle is not None and vehicle.ids is not None:
+                hub.members.heard_vehicle(vehicle.ids, channel, now.mono)
         for observer in self.observers:
             for frame, channel in received:
                 vehicle = self.vehicles.find(*frame.ids)
@@ -196,17 +194,12 @@ class MavlinkHardware:
                 self.hub.ask(ask)
         if self.hub.sender.signing_policy is not None:
             self.hub.sender.signing_policy.keep(now.mono)
-        if now.mono >= self._timer_due:
-            self._serve_timers(now.mono)
-
-    def _serve_timers(self, now: float) -> None:
-        if now >= self._heartbeat_due:
-            late = now - self._heartbeat_due > HEARTBEAT_PERIOD
-            self._heartbeat_due = (now if late else self._heartbeat_due) + HEARTBEAT_PERIOD
-            self.hub.speak(list(self.vehicles.vehicles), now)
-        if now >= self._silent_at:
-            self._log_silence(now)
-        self._timer_due = min(self._heartbeat_due, self._silent_at)
+        if now.mono >= self._heartbeat_due:
+            late = now.mono - self._heartbeat_due > HEARTBEAT_PERIOD
+            self._heartbeat_due = (now.mono if late else self._heartbeat_due) + HEARTBEAT_PERIOD
+            self.hub.speak(self.vehicles.vehicles, now.mono)
+        if now.mono >= self._silent_at:
+            self._log_silence(now.mono)
 
     def _log_silence(self, now: float) -> None:
         if any(self.vehicles.vehicles):
@@ -219,10 +212,8 @@ class MavlinkHardware:
         """When there is something to do. At once (-inf) after a frame that may change a status."""
         if self.hub.receiver.needs_turn:
             return AT_ONCE
-        # compared without `min`: asked after each wake-up
-        timer = self._timer_due if self._timer_due < self.tables.next_due else self.tables.next_due
-        due = self.vehicles.next_due(until if until < timer else timer)
-        return due if due < timer else timer
+        timer = min(self._heartbeat_due, self._silent_at, self.tables.next_due)
+        return min(self.vehicles.next_due(min(until, timer)), timer)
 
     def explain(self, handle: str, now: Instant) -> None:
         """Update the evidence in this handle to `now`."""
@@ -266,22 +257,12 @@ class LinkSource:
             return MOST_AT_ONCE
         received, number = receiver.receive(self._endpoint, now, limit)
         if received:
-            self._process(received, now)
+            if self._endpoint.connections != self._connections:
+                self._connections = self._endpoint.connections
+                self._hardware.vehicles.reconnected(self._hub.members.vehicles_on(self._endpoint), now.mono)
+                self._hub.members.reconnected(self._endpoint)
+            self._hardware.process(received, now)
         return number
-
-    def _process(self, received: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
-        hardware = self._hardware
-        if self._endpoint.connections != self._connections:
-            self._connections = self._endpoint.connections
-            hardware.vehicles.reconnected(self._hub.members.vehicles_on(self._endpoint), now.mono)
-            self._hub.members.reconnected(self._endpoint)
-        take, lag = hardware.vehicles.take, self._hub.receiver.lag
-        for frame, channel in received:
-            vehicle = take(frame, now, channel, lag(frame))
-            if vehicle is not None and vehicle.ids is not None:
-                self._hub.members.heard_vehicle(vehicle.ids, channel, now.mono)
-        if hardware.observers:
-            hardware.observe(received, now)
 
     def service(self, now: Instant) -> None:
         """Connect or reconnect."""

@@ -269,6 +269,9 @@ class Belief:
             self._prove(speaker, at)
             count.ticked_at = at - count.lag.seconds
             return count.lag.seconds
+        echo = self._copies.echoes.get(count.channel) if count.source is not None else None
+        if echo is not None and at - echo.at <= NEAR and echo.delay > NOT_LATE:
+            return echo.delay  # what it brings is as late as its copies
         held = count.held_for(place, at) if place > 0 and speaker.clock.booted is not None else 0.0
         if held:
             count.lag.hold(held + (count.lag.seconds if count.lag.at <= count.at else 0.0), at)

@@ -143,7 +143,7 @@ class Belief:
             return COPY
         clock = message.time_boot_ms / 1000 if message_id in CLOCKED and message is not None else None
         signed = lag if lag > NOT_LATE else 0.0
-        count, place = self._count_of(message_id, sequence, clock, counts, now)
+        count, place = self._count_of(message_id, sequence, clock, counts, now, signed)
         if count is None:
             beat = message if message_id == HEARTBEAT_ID else None
             count, place = self._begin(channel, sequence, clock, beat, counts, at), 1
@@ -190,7 +190,7 @@ class Belief:
                 self._join(other, known, now, "the same frames")
 
     def _count_of(
-        self, message_id: int, sequence: int, clock: float | None, counts: Sequence[Count], now: Instant
+        self, message_id: int, sequence: int, clock: float | None, counts: Sequence[Count], now: Instant, signed: float
     ) -> tuple[Count | None, int]:
         """The count that a frame continues best, and its place there: 0 if it is counted apart."""
         if message_id == COUNTED_APART and counts:
@@ -204,6 +204,8 @@ class Belief:
                 continue
             if count is not ordered[0] and now.mono - count.at > LATE_FOR:
                 break  # another count took its place
+            if signed and found > 0 and now.mono - signed < count.last_said - NEAR:
+                continue  # by its signature it is older than the newest frame of that count
             if clock is not None and _contradicts(count, found, clock, now.mono):
                 refused = count if refused is None and found > 0 else refused
                 continue
@@ -267,6 +269,9 @@ class Belief:
             self._prove(speaker, at)
             count.ticked_at = at - count.lag.seconds
             return count.lag.seconds
+        echo = self._copies.echoes.get(count.channel) if count.source is not None else None
+        if echo is not None and at - echo.at <= NEAR and echo.delay > NOT_LATE:
+            return echo.delay  # what it brings is as late as its copies
         held = count.held_for(place, at) if place > 0 and speaker.clock.booted is not None else 0.0
         if held:
             count.lag.hold(held + (count.lag.seconds if count.lag.at <= count.at else 0.0), at)

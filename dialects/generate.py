@@ -107,8 +107,6 @@ IMPORTS = """from __future__ import annotations
 
 from struct import Struct
 from typing import {}
-
-from ..values import NamedTuple
 """
 
 
@@ -172,7 +170,7 @@ def full_definitions(files: list[mavparse.MAVXML]) -> str:
     shared = sorted(["Definition", *(class_name(name) for name in USED if name not in UNREAD)])
     texts = sorted({f.name for m in messages.values() for f in m.ordered_fields if f.array_length and f.type == "char"})
     out = [HEADER.format("The MAVLink messages of the fake autopilot, with all their fields.")]
-    out.append(IMPORTS.format("Final"))
+    out.append(IMPORTS.format("Final, NamedTuple"))
     out.append("from ..mavlink import definitions\n")
     out.append("from ..mavlink.definitions import (\n")
     out += [f"    {name},\n" for name in shared]
@@ -198,7 +196,7 @@ def definitions(files: list[mavparse.MAVXML]) -> str:
         messages.update({m.name: m for m in file.message if m.name in USED})
         enums.update({e.name: e for e in file.enum})
     out = [HEADER.format("The MAVLink definitions that the gateway needs.")]
-    out.append(IMPORTS.format("Any, Final") + "\n\n")
+    out.append(IMPORTS.format("Any, Final, NamedTuple") + "\n\n")
     out += [message_class(messages[name], read_fields(messages[name])) for name in USED]
     out.append("class Definition(NamedTuple):\n")
     out.append(

@@ -10,7 +10,7 @@ import contextlib
 import dataclasses
 import logging
 import socket
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from .config import Config, GroupConfig, HardwareConfig, LinkConfig, PublisherConfig, VehicleConfig
 from .errors import LinkError, UsageError
@@ -36,7 +36,6 @@ from .testing.fake_arm import FakeArm
 from .testing.fake_fleet import FakeFleet
 from .testing.mobile_manipulator import BASE, follow
 from .testing.scenario import ending
-from .values import NamedTuple
 from .views import terminal
 
 if TYPE_CHECKING:

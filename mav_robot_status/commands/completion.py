@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ..values import NamedTuple
 from . import COMMANDS, PROGRAM, command
 
 if TYPE_CHECKING:

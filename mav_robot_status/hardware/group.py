@@ -6,7 +6,7 @@ whose link is lost is UNKNOWN in every field, and so counts as UNKNOWN.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..interface import (
     STATES,
@@ -19,7 +19,6 @@ from ..interface import (
     TriState,
     Vehicle,
 )
-from ..values import NamedTuple
 from .join import Logic, join
 
 if TYPE_CHECKING:

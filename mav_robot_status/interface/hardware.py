@@ -8,9 +8,8 @@ robot into the handles, update the controllers, `write` to the robot.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from ..values import NamedTuple
 from .registry import IndustrialRobotStatusInterface, InterfaceManager
 from .status import Detail, RobotStatus
 

@@ -15,10 +15,9 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from ..errors import UsageError
-from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

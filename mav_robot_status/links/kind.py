@@ -9,10 +9,9 @@ A package adds a kind with an entry point. Its name is the scheme, its value is 
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from mav_robot_status.errors import LinkError
-from mav_robot_status.values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable

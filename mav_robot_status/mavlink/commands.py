@@ -8,9 +8,7 @@ message that we do not send, UNSUPPORTED for an unknown command.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
-
-from mav_robot_status.values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from . import enumerations
 from .definitions import CommandAck, MessageInterval

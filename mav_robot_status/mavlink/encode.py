@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import struct
 from binascii import crc_hqx
-from typing import TYPE_CHECKING, Final
-
-from mav_robot_status.values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from .definitions import CRC_EXTRA, MESSAGES
 from .wire import REVERSED, V1, V2

@@ -14,9 +14,7 @@ from __future__ import annotations
 
 import struct
 from binascii import crc_hqx
-from typing import TYPE_CHECKING, Any, Final
-
-from mav_robot_status.values import NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from .counters import Counters, count
 from .definitions import CRC_EXTRA

@@ -9,9 +9,7 @@ import re
 from binascii import crc_hqx
 from functools import lru_cache
 from struct import Struct
-from typing import TYPE_CHECKING, Any, Final
-
-from mav_robot_status.values import NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from .decode import READERS
 from .definitions import CRC_EXTRA

@@ -9,12 +9,11 @@ from __future__ import annotations
 import json
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import rfc3339
 from ..interface import STATES
 from ..interface.options import Options
-from ..values import NamedTuple
 from .json_lines import native_body
 
 if TYPE_CHECKING:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 import socket
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..errors import LinkError
-from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -7,10 +7,9 @@ our names and those of the configuration, never an autopilot's texts: these woul
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..interface import FIELDS, Kind, LinkState
-from ..values import NamedTuple
 from ..version import __version__
 
 if TYPE_CHECKING:

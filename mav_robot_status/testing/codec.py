@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from ..mavlink.decode import text
 from ..mavlink.encode import enclose
 from ..mavlink.framing import Frame, Parser
-from ..values import NamedTuple
 from .definitions import MESSAGES, TEXTS
 
 LAYOUTS: Final = {d.type: (d.id, d.layout) for d in MESSAGES.values()}

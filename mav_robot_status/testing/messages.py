@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-
-from mav_robot_status.values import NamedTuple
+from typing import NamedTuple
 
 from .definitions import (
     Attitude,

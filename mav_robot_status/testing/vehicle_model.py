@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 from ..clock import Instant
-from ..values import NamedTuple
 from .codec import encode
 from .event_table import VehicleFiles
 from .file_server import FileServer

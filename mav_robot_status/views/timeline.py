@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import bisect
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..interface import STATES, LinkState, TriState
-from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

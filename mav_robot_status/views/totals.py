@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, Final
-
-from mav_robot_status.values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..interface import LinkState
 

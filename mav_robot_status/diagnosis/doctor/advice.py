@@ -7,13 +7,12 @@ Betaflight's command lines.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...clock import rfc3339
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_ARDUPILOTMEGA, MAV_AUTOPILOT_PX4
-from ...values import NamedTuple
 from ..applet import PAGE, WORDS
 from .findings import HEARTBEAT
 from .heard import duration

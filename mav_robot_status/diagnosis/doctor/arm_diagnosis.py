@@ -8,12 +8,11 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import STATES
 from ...links.url import host_port
 from ...simple_message import SHORTEST, STATE_PORT, STATUS, STATUS_LENGTH
-from ...values import NamedTuple
 from .advice import protocol
 from .diagnosis import Diagnosis
 

@@ -6,9 +6,7 @@ The first case that applies is the diagnosis. A fault that hides other faults co
 from __future__ import annotations
 
 import errno
-from typing import TYPE_CHECKING, Final
-
-from mav_robot_status.values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from .advice import (
     OTHER_SYSTEM,

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...hardware.mavlink.identity import named
 from ...hardware.mavlink.senders import LATE, Sender, Strangers
 from ...hardware.mavlink.state.applet import FRESH
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
-from ...values import NamedTuple
 from .heard import Heard
 
 if TYPE_CHECKING:

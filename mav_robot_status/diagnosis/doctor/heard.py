@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...gateway.observer import Observer
 from ...interface import STATES, LinkState
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from ...clock import Instant

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...publishers.ros.messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS
 from ...publishers.ros.publisher import extra_of
 from ...publishers.ros.settings import DDS, ZENOH
 from ...publishers.ros.transport import Endpoint, UnreachableError
-from ...values import NamedTuple
 from .diagnosis import Diagnosis
 
 if TYPE_CHECKING:

@@ -5,10 +5,9 @@ A controller may send any number. What has no meaning is UNKNOWN, and so are two
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import Detail, ErrorCause, Evidence, Inhibit, RobotMode, RobotStatus, TriState, Vehicle
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from ...simple_message import StatusFrame

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...interface import (
     Detail,
@@ -20,7 +20,6 @@ from ...interface import (
     TriState,
     Vehicle,
 )
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

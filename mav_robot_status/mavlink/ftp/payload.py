@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ...values import NamedTuple
 from ..definitions import FileTransferProtocol
 
 if TYPE_CHECKING:

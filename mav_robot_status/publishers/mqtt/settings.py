@@ -6,12 +6,11 @@ import hashlib
 import os
 import ssl
 from stat import S_IRWXG, S_IRWXO
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
 from ...interface.options import short
-from ...values import NamedTuple
 from .naming import places
 from .options import DEFAULT_ROBOT, BrokerOptions, MqttOptions
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
 from ...interface.options import short
-from ...values import NamedTuple
 from .naming import DIAGNOSTICS, is_name
 from .options import Ros2Options
 

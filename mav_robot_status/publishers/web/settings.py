@@ -6,11 +6,10 @@ import ipaddress
 import os
 import socket
 from stat import S_IRGRP, S_IROTH, S_IWGRP, S_IWOTH
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...errors import UsageError
 from ...interface.options import short
-from ...values import NamedTuple
 from ..listener import listen as open_listener
 from ..listener import place, resolve
 from .options import DEFAULT_LISTEN, HttpOptions

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 from ...clock import rfc3339
 from ...interface import DEFAULT_HANDLE_NAME
 from ...language import headline, look
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from ...clock import Instant

@@ -5,11 +5,10 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterable, Iterator
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...language import TONES
 from ...streams import visible
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from ...language import Headline, Look, Tone

@@ -8,14 +8,14 @@ import time
 from typing import TYPE_CHECKING, Final, Protocol
 
 from ...clock import now as present
-from ...errors import LinkError
+from ...errors import LinkError, ProtocolError
 from ...gateway.event_loop import EventLoop
 from ...hardware.simple_message.interface import SimpleMessageHardwareOptions
 from ...hardware.ur.interface import RATE, UrOptions
-from ...hardware.ur.rtde import ProtocolError, Session
+from ...hardware.ur.rtde import Session
 from ...hardware.ur.status import NAMES
 from ...interface import LinkState
-from ...simple_message import FrameError, StatusReader
+from ...simple_message import StatusReader
 from ...streams import NO_OUTPUT
 from ..explain import silent
 from .arm_diagnosis import ArmFindings, diagnose_arm
@@ -35,7 +35,6 @@ SETTLE: Final = 1.5
 ANSWER: Final = 3.0
 """Seconds for the controller to answer when it is asked again."""
 CHUNK: Final = 4096
-FAULTS: Final = (ProtocolError, FrameError)
 
 
 class Talk(Protocol):
@@ -45,7 +44,7 @@ class Talk(Protocol):
         """What to send next."""
 
     def hear(self, data: bytes) -> bool:
-        """Whether the status is complete. Raises one of FAULTS."""
+        """Whether the status is complete. Raises ProtocolError."""
 
     @property
     def waits_for(self) -> str:
@@ -164,7 +163,7 @@ def ask_again(found: ArmFindings, talk: Talk, answer: float = ANSWER) -> ArmFind
                 if not data or talk.hear(data):
                     break
                 controller.sendall(talk.ask())
-    except FAULTS as error:
+    except ProtocolError as error:
         fault = str(error)
     except OSError:  # it is silent, or has closed the connection: the bytes that arrived say more
         pass

@@ -5,9 +5,10 @@ A controller may send any number. What has no meaning is UNKNOWN, and so are two
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from ...interface import Detail, ErrorCause, Evidence, Inhibit, RobotMode, RobotStatus, TriState, Vehicle
+from ..tcp_arm import Values
 
 if TYPE_CHECKING:
     from ...simple_message import StatusFrame
@@ -20,14 +21,6 @@ CONTROLLER: Final = "SIMPLE_MESSAGE"
 """`vehicle.autopilot`: the frame does not say which controller it is."""
 NO_CODE: Final = 8000
 """The error code of a controller that reports an error without a code."""
-
-
-class Values(NamedTuple):
-    """The values for a handle."""
-
-    status: RobotStatus
-    detail: Detail
-    evidence: dict[str, Evidence]
 
 
 def status_of(frame: StatusFrame) -> RobotStatus:

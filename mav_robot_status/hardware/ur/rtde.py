@@ -12,6 +12,8 @@ from enum import Enum
 from struct import Struct
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from ...errors import ProtocolError
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -37,10 +39,6 @@ TYPES: Final = {
 NOT_FOUND: Final = "NOT_FOUND"
 FIRMWARE: Final = Struct(">IIII")
 RATE: Final = Struct(">d")
-
-
-class ProtocolError(Exception):
-    """The peer does not speak RTDE as expected. The text says why; the connection is of no use any more."""
 
 
 class Recipe(NamedTuple):

@@ -20,6 +20,7 @@ from ...interface import (
     TriState,
     Vehicle,
 )
+from ..tcp_arm import Values
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -136,14 +137,6 @@ class Joints:
         elif self.slow_since is not None and now >= self.slow_since + SUSTAIN_OFF:
             self.value = FALSE
         return self.value
-
-
-class Values(NamedTuple):
-    """The values for a handle."""
-
-    status: RobotStatus
-    detail: Detail
-    evidence: dict[str, Evidence]
 
 
 class Context(NamedTuple):

@@ -8,15 +8,13 @@ import os
 import signal
 import sys
 import threading
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Sequence
+from typing import NoReturn
 
 from .commands import COMMANDS, PROGRAM, command, importing
 from .errors import MavRobotStatusError, UsageError
 from .streams import StderrHandler, complain, detach, open_missing, writing
 from .version import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 class _Arguments(argparse.ArgumentParser):

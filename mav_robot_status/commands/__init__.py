@@ -6,14 +6,12 @@ arguments that several commands share; `overrides` and `arms` apply them to the 
 
 from __future__ import annotations
 
+import argparse
 import gc
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from typing import TYPE_CHECKING, Final, Protocol, cast
-
-if TYPE_CHECKING:
-    import argparse
-    from collections.abc import Iterator
+from typing import Final, Protocol, cast
 
 PROGRAM: Final = "mav-robot-status"
 COMMANDS: Final = {

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections.abc import Iterator
+from typing import Final, NamedTuple
 
 from . import COMMANDS, PROGRAM, command
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 SHELLS: Final = ("bash", "zsh", "fish")
 FILES: Final = ("FILE", "DIR", "LOG", "CONNECTION")

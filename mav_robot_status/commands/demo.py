@@ -5,17 +5,15 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from ..config import ControllerConfig
 from ..errors import UsageError
 from ..publishers.ros.options import Ros2Options
 from ..publishers.simple_message.options import SimpleMessageOptions
 from ..publishers.web.options import DEFAULT_LISTEN, HttpOptions
 from .options import publisher, verbosity
 from .overrides import with_publisher
-
-if TYPE_CHECKING:
-    from ..config import ControllerConfig
 
 MOST_VEHICLES: Final = 254
 

@@ -10,16 +10,13 @@ import contextlib
 import os
 import re
 import sys
+from collections.abc import Container, Iterable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from ..config.model import LONGEST_NAME, is_vehicle_name
+from ..interface import Options
 from ..links.url import help_text
-
-if TYPE_CHECKING:
-    from collections.abc import Container, Iterable
-
-    from ..interface import Options
 
 _NAMED: Final = re.compile(r"([0-9]{1,3})(?:\.([0-9]{1,3}))?=(.*)", re.ASCII | re.DOTALL)
 

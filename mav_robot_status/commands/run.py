@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
-from typing import TYPE_CHECKING
 
+from ..config import Config
 from ..errors import UsageError
 from ..links.url import parse
 from ..publishers.json_lines import JsonOptions
@@ -24,11 +25,6 @@ from .options import (
     verbosity,
 )
 from .overrides import configured
-
-if TYPE_CHECKING:
-    import argparse
-
-    from ..config import Config
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from ..clock import Instant
 from ..hardware.mavlink.autopilots import ARDUPILOT
+from ..hardware.mavlink.interface import MavlinkRobotHW
 from ..hardware.mavlink.state.applet import EMERGENCY_STOP, SAFETY_SWITCH
-
-if TYPE_CHECKING:
-    from ..clock import Instant
-    from ..hardware.mavlink.interface import MavlinkRobotHW
-    from ..hardware.mavlink.state.vehicle_state import VehicleState
-    from ..json_object import JsonObject
+from ..hardware.mavlink.state.vehicle_state import VehicleState
+from ..json_object import JsonObject
 
 PAGE: Final = "docs/ardupilot-applet.md"
 WORDS: Final = {

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..clock import rfc3339
+from ..hardware.mavlink.interface import MavlinkRobotHW
+from ..hardware.mavlink.px4_events import EventTable
 from ..hardware.mavlink.px4_events.ids import ALL_MODES
 from ..hardware.mavlink.px4_events.table import component_words
 from ..hardware.mavlink.state import arming_report
 from ..hardware.mavlink.state.arming_reasons import failing, words
-
-if TYPE_CHECKING:
-    from ..hardware.mavlink.interface import MavlinkRobotHW
-    from ..hardware.mavlink.px4_events import EventTable
-    from ..hardware.mavlink.state.arming_report import Check
-    from ..hardware.mavlink.state.vehicle_state import VehicleState
-    from ..json_object import JsonObject
+from ..hardware.mavlink.state.arming_report import Check
+from ..hardware.mavlink.state.vehicle_state import VehicleState
+from ..json_object import JsonObject
 
 
 def reports(hw: MavlinkRobotHW) -> dict[str, list[JsonObject]]:

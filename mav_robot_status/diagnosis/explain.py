@@ -6,32 +6,27 @@ import dataclasses
 import json
 import logging
 import re
+from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, Final
+from typing import Final, TextIO
 
 from ..clock import Instant, later, rfc3339
 from ..clock import now as present
+from ..config import Config
 from ..errors import UsageError
 from ..gateway.controller_config import DEFAULT_CONTROLLER
 from ..gateway.event_loop import EventLoop
 from ..gateway.recorded_log import Recording
 from ..gateway.replay import ReplayPipeline, run_through
+from ..hardware.mavlink.interface import MavlinkRobotHW
 from ..hardware.mavlink.senders import Sender, senders
-from ..interface import LinkState
+from ..interface import HardwareInterface, IndustrialRobotStatusHandle, LinkState
 from ..interface.explanation import explanation
+from ..json_object import JsonObject
 from ..language import remedy
+from ..links.log import Stamped
 from ..streams import NO_OUTPUT
 from . import applet, arming_checks
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-    from typing import TextIO
-
-    from ..config import Config
-    from ..hardware.mavlink.interface import MavlinkRobotHW
-    from ..interface import HardwareInterface, IndustrialRobotStatusHandle
-    from ..json_object import JsonObject
-    from ..links.log import Stamped
 
 log = logging.getLogger(__name__)
 

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Final, Generic, NamedTuple, TypeVar
+from collections.abc import Sequence
+from typing import Final, Generic, NamedTuple, TypeVar
 
+from ..clock import Instant
 from ..errors import ProtocolError
-from ..interface import Detail, Evidence, IndustrialRobotStatusHandle, Inhibit, LinkState, RobotHW, RobotStatus
+from ..interface import (
+    Detail,
+    Evidence,
+    HardwareContext,
+    IndustrialRobotStatusHandle,
+    Inhibit,
+    LinkState,
+    RobotHW,
+    RobotStatus,
+)
 from .tcp_source import FaultLog, TcpSource
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..clock import Instant
-    from ..interface import HardwareContext
 
 SILENCE: Final = 3.0
 """Seconds without a message after which the link is lost, and a connection is of no use."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol, TextIO
+from collections.abc import Callable, Collection, Container, Hashable, Mapping, Sequence
+from typing import NamedTuple, Protocol, TextIO
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Container, Hashable, Mapping, Sequence
-
-    from ..clock import Instant
-    from ..json_object import JsonMapping
-    from .metrics import Metrics
-    from .status import RobotStatusMsg
+from ..clock import Instant
+from ..json_object import JsonMapping
+from .metrics import Metrics
+from .status import RobotStatusMsg
 
 
 class Publisher(Protocol):

@@ -9,19 +9,14 @@ from __future__ import annotations
 import json
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections.abc import Iterator
+from typing import Final, NamedTuple
 
-from ..clock import rfc3339
-from ..interface import STATES
+from ..clock import Instant, rfc3339
+from ..interface import STATES, PublisherContext, RobotStatusMsg
 from ..interface.options import Options
+from ..json_object import JsonMapping, JsonObject
 from .json_lines import native_body
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from ..clock import Instant
-    from ..interface import PublisherContext, RobotStatusMsg
-    from ..json_object import JsonMapping, JsonObject
 
 MOST_HANDLES: Final = 4096
 MOST_MEMBERS: Final = 256

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
-from ..clock import rfc3339
-from ..interface import FIELDS, Kind, RobotMode, TriState
+from ..clock import Instant, rfc3339
+from ..interface import (
+    FIELDS,
+    Detail,
+    Kind,
+    PublisherContext,
+    RobotMode,
+    RobotStatus,
+    RobotStatusMsg,
+    TriState,
+    Vehicle,
+)
 from ..interface.options import Option, Options
 from .line_output import LineOutput, PatientLineOutput
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from ..clock import Instant
-    from ..interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg, Vehicle
 
 WORDS: Final[dict[Kind, Mapping[int, str]]] = {
     Kind.MODE: {mode: f'"{mode.name}"' for mode in RobotMode},

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from ..interface import Options
-
-if TYPE_CHECKING:
-    from ..clock import Instant
-    from ..interface import PublisherContext, RobotStatusMsg
+from ..clock import Instant
+from ..interface import Options, PublisherContext, RobotStatusMsg
 
 MAX_MESSAGES: Final = 10_000
 

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import TYPE_CHECKING, ClassVar, Final, Generic, TypeVar
+from collections.abc import Hashable, Sequence
+from typing import ClassVar, Final, Generic, TypeVar
 
-from ..interface import LinkState
+from ..clock import Instant
+from ..interface import Audience, LinkState, PublisherContext, RobotStatusMsg
 from ..interface.options import Options
-
-if TYPE_CHECKING:
-    from collections.abc import Hashable, Sequence
-
-    from ..clock import Instant
-    from ..interface import Audience, PublisherContext, RobotStatusMsg
 
 MOST_CHANGES: Final = 5
 WINDOW: Final = 1.0  # s

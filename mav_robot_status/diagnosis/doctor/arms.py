@@ -5,30 +5,26 @@ from __future__ import annotations
 import dataclasses
 import socket
 import time
-from typing import TYPE_CHECKING, Final, Protocol
+from collections.abc import Callable
+from typing import Final, Protocol
 
+from ...clock import Instant
 from ...clock import now as present
+from ...config import Config, HardwareConfig
 from ...errors import LinkError, ProtocolError
 from ...gateway.event_loop import EventLoop
 from ...hardware.simple_message.interface import SimpleMessageHardwareOptions
 from ...hardware.ur.interface import RATE, UrOptions
 from ...hardware.ur.rtde import Session
 from ...hardware.ur.status import NAMES
-from ...interface import LinkState
+from ...interface import IndustrialRobotStatusHandle, LinkState
 from ...simple_message import StatusReader
 from ...streams import NO_OUTPUT
 from ..explain import silent
 from .arm_diagnosis import ArmFindings, diagnose_arm
 from .collector import HEAD
+from .diagnosis import Diagnosis
 from .probes import PATIENCE, tcp_trouble
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...clock import Instant
-    from ...config import Config, HardwareConfig
-    from ...interface import IndustrialRobotStatusHandle
-    from .diagnosis import Diagnosis
 
 SETTLE: Final = 1.5
 """Seconds from the first status until motion and the operational mode are known too."""

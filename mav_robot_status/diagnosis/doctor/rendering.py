@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 from ...clock import rfc3339
 from ...hardware.mavlink.identity import named
+from ...json_object import JsonObject
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_PX4
 from .advice import applet_heard, listed, named_all
-from .findings import GROUND_STATION
-from .heard import duration
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from ...json_object import JsonObject
-    from .diagnosis import Diagnosis
-    from .findings import Findings, Speaker
-    from .heard import Heard
+from .diagnosis import Diagnosis
+from .findings import GROUND_STATION, Findings, Speaker
+from .heard import Heard, duration
 
 FEW_SOURCES = 4
 """Limit of addresses in the text. The JSON has all."""

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections.abc import Callable
+from typing import Final, NamedTuple
 
 from ...publishers.ros.messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS
 from ...publishers.ros.publisher import extra_of
-from ...publishers.ros.settings import DDS, ZENOH
+from ...publishers.ros.settings import DDS, ZENOH, Ros2Settings
 from ...publishers.ros.transport import Endpoint, UnreachableError
 from .diagnosis import Diagnosis
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...publishers.ros.settings import Ros2Settings
 
 TYPES: Final = {kind.dds_name: kind for kind in (ROBOT_STATUS, DIAGNOSTIC_ARRAY)}
 MOST_SHOWN: Final = 8

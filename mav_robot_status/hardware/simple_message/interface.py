@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+from ...clock import Instant
 from ...interface import HardwareContext, Option, Options
 from ...simple_message import ORDERS, STATE_PORT, StatusFrame, StatusReader
 from ..tcp_arm import TcpArm, Values
 from .status import values_of
-
-if TYPE_CHECKING:
-    from ...clock import Instant
 
 
 @dataclass(frozen=True)

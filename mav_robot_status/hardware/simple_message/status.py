@@ -5,13 +5,11 @@ A controller may send any number. What has no meaning is UNKNOWN, and so are two
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ...interface import Detail, ErrorCause, Evidence, Inhibit, RobotMode, RobotStatus, TriState, Vehicle
+from ...simple_message import StatusFrame
 from ..tcp_arm import Values
-
-if TYPE_CHECKING:
-    from ...simple_message import StatusFrame
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 TRI_STATES: Final = {state.value: state for state in TriState}

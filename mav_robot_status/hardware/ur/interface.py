@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
+from ...clock import Instant
 from ...interface import HardwareContext, Option, Options, RobotMode
 from ..tcp_arm import TcpArm, Values
 from ..tcp_source import TcpSource
 from .dashboard import Dashboard
 from .rtde import Session
 from .status import NAMES, Context, Joints, Sample, sample_of, values_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ...clock import Instant
 
 log = logging.getLogger(__name__)
 

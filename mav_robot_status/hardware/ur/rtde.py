@@ -8,14 +8,12 @@ Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide".
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from struct import Struct
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from ...errors import ProtocolError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 HEADER: Final = Struct(">HB")
 PROTOCOL: Final = 2

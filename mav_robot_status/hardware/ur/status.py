@@ -7,8 +7,9 @@ Universal Robots' ROS driver, which leaves in_motion unknown and error_code 0.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from ...interface import (
     Detail,
@@ -21,9 +22,6 @@ from ...interface import (
     Vehicle,
 )
 from ..tcp_arm import Values
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import socket
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
 from .options import VERSIONS
 from .reasons import unreachable
-
-if TYPE_CHECKING:
-    from .settings import Broker
+from .settings import Broker
 
 MOST_IN_FLIGHT: Final = 10
 """The limit on publications without an acknowledgement. Further ones wait in the client. HiveMQ allows 10, mosquitto

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ...clock import rfc3339
-from ...interface import FIELDS, RobotStatus
+from ...interface import FIELDS, RobotStatus, RobotStatusMsg
+from ...json_object import JsonMapping, JsonObject
 from ..json_lines import native, native_body
-
-if TYPE_CHECKING:
-    from ...interface import RobotStatusMsg
-    from ...json_object import JsonMapping, JsonObject
 
 UNKNOWN: Final[JsonObject] = {
     **{field.name: field.plain(value) for field, value in zip(FIELDS, RobotStatus(), strict=True)},

@@ -5,17 +5,15 @@ from __future__ import annotations
 import hashlib
 import os
 import ssl
+from collections.abc import Callable, Mapping
 from stat import S_IRWXG, S_IRWXO
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
 from ...interface.options import short
 from .naming import places
 from .options import DEFAULT_ROBOT, BrokerOptions, MqttOptions
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 EXAMPLE: Final = "mqtts://broker.example/robots"
 PASSWORD: Final = "MAV_ROBOT_STATUS_MQTT_PASSWORD"

@@ -5,17 +5,15 @@ from __future__ import annotations
 import logging
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from ...clock import Instant
+from ...interface import PublisherContext, RobotStatusMsg
 from ...simple_message import StatusEncoder
 from ..listener import listen
 from .options import NAME, SimpleMessageOptions, read
 from .requests import RequestReader
 from .server import MOST_CLIENTS, SOCKET_OPTIONS, Server
-
-if TYPE_CHECKING:
-    from ...clock import Instant
-    from ...interface import PublisherContext, RobotStatusMsg
 
 log = logging.getLogger(__name__)
 

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Sequence
 from typing import NoReturn
 
-from .commands import COMMANDS, PROGRAM, command, importing
+from .commands import COMMANDS, PROGRAM, command
 from .errors import MavRobotStatusError, UsageError
 from .streams import StderrHandler, complain, detach, open_missing, writing
 from .version import __version__
@@ -19,9 +19,6 @@ from .version import __version__
 
 class _Arguments(argparse.ArgumentParser):
     """Reports an error in one line. argparse would print all options first."""
-
-    words: Sequence[str] | None = None
-    """The arguments that will be read; None if they are not known."""
 
     def error(self, message: str) -> NoReturn:
         """Raises UsageError."""
@@ -63,8 +60,7 @@ def _doubt_command(first: Sequence[str]) -> None:
 
 def _run(arguments: list[str]) -> int:
     try:
-        with importing():
-            options = _options(arguments)
+        options = _options(arguments)
         if "verbose" in options:
             _log_to_stderr(options)
         return command(options.command).run(options)
@@ -77,11 +73,8 @@ def _options(arguments: list[str]) -> argparse.Namespace:
     """The arguments, read. Only the given command is imported and declares its arguments."""
     if arguments[0] not in COMMANDS:
         return _parser().parse_args(arguments)
-    from .commands.options import Help
-
     name = arguments[0]
-    parser = _Arguments(prog=f"{PROGRAM} {name}", formatter_class=Help)
-    parser.words = arguments[1:]
+    parser = _Arguments(prog=f"{PROGRAM} {name}")
     command(name).arguments(parser)
     return parser.parse_args(arguments[1:], argparse.Namespace(command=name))
 

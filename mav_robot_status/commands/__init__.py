@@ -7,9 +7,6 @@ arguments that several commands share; `overrides` and `arms` apply them to the 
 from __future__ import annotations
 
 import argparse
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
 from typing import Final, Protocol, cast
 
@@ -39,17 +36,6 @@ class Command(Protocol):
 
     def run(self, options: argparse.Namespace) -> int:
         """Run the command and return its exit code. Raises MavRobotStatusError."""
-
-
-@contextmanager
-def importing() -> Iterator[None]:
-    """Pause the garbage collector while modules are imported: it would only search objects that stay."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.enable()
 
 
 def command(name: str) -> Command:

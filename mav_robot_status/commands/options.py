@@ -7,51 +7,33 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import os
 import re
-import sys
-from collections.abc import Container, Iterable
-from importlib import import_module
+from collections.abc import Container
 from typing import Any, Final
 
 from ..config.model import LONGEST_NAME, is_vehicle_name
 from ..interface import Options
 from ..links.url import help_text
+from ..publishers.mqtt.options import MqttOptions
+from ..publishers.ros.options import Ros2Options
+from ..publishers.simple_message.options import SimpleMessageOptions
+from ..publishers.web.options import HttpOptions
 
 _NAMED: Final = re.compile(r"([0-9]{1,3})(?:\.([0-9]{1,3}))?=(.*)", re.ASCII | re.DOTALL)
 
-WITH_ARGUMENTS: Final = {
-    "http": (("--http", "--alarm"), "publishers.web.options", "HttpOptions"),
-    "mqtt": (("--mqtt",), "publishers.mqtt.options", "MqttOptions"),
-    "simple_message": (("--simple-message",), "publishers.simple_message.options", "SimpleMessageOptions"),
-    "ros2": (("--ros2",), "publishers.ros.options", "Ros2Options"),
+WITH_ARGUMENTS: Final[dict[str, type[Options]]] = {
+    "http": HttpOptions,
+    "mqtt": MqttOptions,
+    "simple_message": SimpleMessageOptions,
+    "ros2": Ros2Options,
 }
-"""The publishers that the command line can add. For each: the beginnings of its flags, first that of the flag that
-enables it; and the class that declares its options."""
+"""The publishers that the command line can add, by type: the first option of each has the flag that enables it."""
 
 FORMS = "forms"
 """A placeholder in a parser for the connection forms: finding every kind of link scans the installed packages."""
 
 
-class Help(argparse.HelpFormatter):
-    """As wide as the terminal. argparse makes one for each argument, and imports all compressors to find the width."""
-
-    def __init__(self, prog: str, **options: Any) -> None:
-        options.setdefault("width", _columns() - 2)
-        super().__init__(prog, **options)
-
-
-def _columns() -> int:
-    """The width of the terminal, as `shutil` has it."""
-    with contextlib.suppress(KeyError, ValueError):
-        if (columns := int(os.environ["COLUMNS"])) > 0:
-            return columns
-    with contextlib.suppress(AttributeError, ValueError, OSError):
-        return os.get_terminal_size(sys.__stdout__.fileno()).columns or 80  # type: ignore[union-attr]
-    return 80
-
-
-class ConnectionHelp(Help, argparse.RawDescriptionHelpFormatter):
+class ConnectionHelp(argparse.RawDescriptionHelpFormatter):
     """Writes the forms of a connection at the end of the help."""
 
     def add_text(self, text: str | None) -> None:
@@ -109,34 +91,9 @@ def publisher(parser: argparse.ArgumentParser, options: type[Options], without: 
 
 
 def publishers(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the publishers in WITH_ARGUMENTS that the given ones may name: the first flag enables each.
-
-    To declare the arguments of one publisher takes 1 % of the time in which a gateway starts.
-    """
-    words = getattr(parser, "words", None)
-    for kind, (flags, _, _) in WITH_ARGUMENTS.items():
-        if words is None or any(may_name(flag, words) for flag in flags):
-            publisher(parser, options_of(kind))
-
-
-def options_of(kind: str) -> type[Options]:
-    """The options of a publisher in WITH_ARGUMENTS."""
-    _, module, name = WITH_ARGUMENTS[kind]
-    found: type[Options] = getattr(import_module(f"...{module}", __name__), name)
-    return found
-
-
-def may_name(flag: str, words: Iterable[str]) -> bool:
-    """Whether one of these arguments may be a flag that begins with `flag`, abbreviated or not, or asks for help."""
-    for word in words:
-        name = word.partition("=")[0]
-        if name[:1] != "-":
-            continue
-        if name.startswith(flag) or flag.startswith(name) or "--help".startswith(name):
-            return True
-        if name[:2] != "--" and "h" in name:  # -qh
-            return True
-    return False
+    """The arguments of all publishers that the command line can add. The first flag of each enables it."""
+    for options in WITH_ARGUMENTS.values():
+        publisher(parser, options)
 
 
 def given(options: argparse.Namespace, declared: type[Options]) -> dict[str, object]:

@@ -9,7 +9,7 @@ from ..config import Config
 from ..errors import UsageError
 from ..links.url import parse
 from ..publishers.json_lines import JsonOptions
-from . import PROGRAM, importing
+from . import PROGRAM
 from .options import (
     arms,
     baud,
@@ -60,8 +60,7 @@ def run(options: argparse.Namespace) -> int:
         _check_live(options)
         return _live(config, options)
     _check_replay(config, options, log)
-    with importing():
-        from ..gateway.replay import replay
+    from ..gateway.replay import replay
 
     replay(config, log, sys.stdout, raw=options.raw)
     return 0
@@ -74,11 +73,10 @@ def _log(config: Config) -> str | None:
 
 
 def _live(config: Config, options: argparse.Namespace) -> int:
-    with importing():
-        from ..gateway.event_loop import EventLoop
-        from ..gateway.systemd import SystemdNotifier
+    from ..gateway.event_loop import EventLoop
+    from ..gateway.systemd import SystemdNotifier
 
-        gateway = EventLoop(config, sys.stdout, notifier=SystemdNotifier())
+    gateway = EventLoop(config, sys.stdout, notifier=SystemdNotifier())
     gateway.stop_on_signals()
     if options.config:
         gateway.reload_on_hangup(lambda: _again(options))

@@ -6,7 +6,6 @@ The numbers of handles and transitions and their age are bounded.
 
 from __future__ import annotations
 
-import json
 import threading
 from collections import deque
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ from ..clock import Instant, rfc3339
 from ..interface import STATES, PublisherContext, RobotStatusMsg
 from ..interface.options import Options
 from ..json_object import JsonMapping, JsonObject
-from .json_lines import native_body
+from .json_lines import members
 
 MOST_HANDLES: Final = 4096
 MOST_MEMBERS: Final = 256
@@ -103,7 +102,7 @@ class Board:
         content = (msg.status, msg.detail)
         if self._seen.get(msg.handle) != content:
             self._seen[msg.handle] = content
-            self._change(entry, json.loads("{" + native_body(msg.handle, *content) + "}}"), stamp, now)
+            self._change(entry, members(msg.handle, *content), stamp, now)
         entry.stamp, entry.at = stamp, now
         entry.heartbeat_age = None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from ..clock import Instant, rfc3339
-from ..interface import STATES, PublisherContext, RobotStatusMsg
+from ..interface import STATES, Publisher, PublisherContext, RobotStatusMsg
 from ..interface.options import Options
 from ..json_object import JsonMapping, JsonObject
 from .json_lines import members
@@ -167,7 +167,7 @@ class Board:
         entry.version = self.version
 
 
-class BoardPublisher:
+class BoardPublisher(Publisher):
     """Puts statuses on its board, for a view in the same process."""
 
     periodic = True
@@ -180,10 +180,6 @@ class BoardPublisher:
         self.lock = threading.Lock()
         """The lock of the board. Another thread must hold it to read the board."""
         self._waiting: list[RobotStatusMsg] = []
-
-    def busy(self) -> bool:
-        """Never."""
-        return False
 
     def publish(self, msg: RobotStatusMsg) -> None:
         """Hold the message until `service`, which follows every round of updates."""
@@ -201,9 +197,6 @@ class BoardPublisher:
         """Remove a handle that is gone from the board."""
         with self.lock:
             self.board.forget(handle)
-
-    def close(self) -> None:
-        """Nothing to release."""
 
 
 def _order(entry: Entry) -> tuple[bool, int, int, str]:

@@ -22,23 +22,16 @@ FEW_SOURCES = 4
 
 def as_text(f: Findings, diagnosis: Diagnosis) -> list[str]:
     """The diagnosis, the remarks and the next action, as lines."""
-    return [
-        f"{f.words}: {diagnosis.matter} [{diagnosis.cause}]",
-        *(f"  {line}" for line in remarks(f)),
-        f"next: {diagnosis.next}",
-    ]
+    return diagnosis.text(f.words, remarks(f))
 
 
 def as_json(f: Findings, diagnosis: Diagnosis) -> str:
-    """The same as a JSON object. Members and causes are stable; the wording of `found` and `next` is not."""
+    """The same as a JSON object."""
     c = f.counters
     return json.dumps(
         {
             "connection": f.url.text,
-            "cause": diagnosis.cause,
-            "ok": diagnosis.ok,
-            "found": [diagnosis.matter, *remarks(f)],
-            "next": diagnosis.next,
+            **diagnosis.members(remarks(f)),
             "seconds": f.seconds,
             "bytes": f.size,
             "frames": c.frames,

@@ -73,8 +73,10 @@ def _options(arguments: list[str]) -> argparse.Namespace:
     """The arguments, read. Only the given command is imported and declares its arguments."""
     if arguments[0] not in COMMANDS:
         return _parser().parse_args(arguments)
+    from .commands.options import Help
+
     name = arguments[0]
-    parser = _Arguments(prog=f"{PROGRAM} {name}")
+    parser = _Arguments(prog=f"{PROGRAM} {name}", formatter_class=Help)
     command(name).arguments(parser)
     return parser.parse_args(arguments[1:], argparse.Namespace(command=name))
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import re
-from collections.abc import Container
-from typing import Any, Final
+import sys
+from collections.abc import Callable, Container
+from typing import Any, Final, TypeVar
 
 from ..config.model import LONGEST_NAME, is_vehicle_name
 from ..interface import Options
@@ -18,6 +20,8 @@ from ..publishers.mqtt.options import MqttOptions
 from ..publishers.ros.options import Ros2Options
 from ..publishers.simple_message.options import SimpleMessageOptions
 from ..publishers.web.options import HttpOptions
+
+N = TypeVar("N", int, float)
 
 _NAMED: Final = re.compile(r"([0-9]{1,3})(?:\.([0-9]{1,3}))?=(.*)", re.ASCII | re.DOTALL)
 
@@ -33,7 +37,25 @@ FORMS = "forms"
 """A placeholder in a parser for the connection forms: finding every kind of link scans the installed packages."""
 
 
-class ConnectionHelp(argparse.RawDescriptionHelpFormatter):
+class Help(argparse.HelpFormatter):
+    """As wide as the terminal. argparse makes one for each argument, and imports all compressors to find the width."""
+
+    def __init__(self, prog: str, **options: Any) -> None:
+        options.setdefault("width", _columns() - 2)
+        super().__init__(prog, **options)
+
+
+def _columns() -> int:
+    """The width of the terminal, as `shutil` has it."""
+    with contextlib.suppress(KeyError, ValueError):
+        if (columns := int(os.environ["COLUMNS"])) > 0:
+            return columns
+    with contextlib.suppress(AttributeError, ValueError, OSError):
+        return os.get_terminal_size(sys.__stdout__.fileno()).columns or 80  # type: ignore[union-attr]
+    return 80
+
+
+class ConnectionHelp(Help, argparse.RawDescriptionHelpFormatter):
     """Writes the forms of a connection at the end of the help."""
 
     def add_text(self, text: str | None) -> None:
@@ -114,33 +136,23 @@ def verbosity(parser: argparse.ArgumentParser) -> None:
     group.add_argument("-q", "--quiet", action="store_true", help="log warnings only")
 
 
-def rate(text: str) -> float:
-    """Hz; 0 for none. Raises ArgumentTypeError, like the functions below."""
-    with contextlib.suppress(ValueError):
-        if 0 <= (hertz := float(text)) <= 1000:
-            return hertz
-    raise argparse.ArgumentTypeError(f"{text!r} is not a rate; write a number of Hz up to 1000, 0 for none")
+def number(kind: Callable[[str], N], low: float, high: float, what: str) -> Callable[[str], N]:
+    """The type of an argument: a number from `low` to `high`. It raises ArgumentTypeError for another text."""
+
+    def read(text: str) -> N:
+        with contextlib.suppress(ValueError):
+            if low <= (found := kind(text)) <= high:
+                return found
+        raise argparse.ArgumentTypeError(f"{text!r} is not {what}")
+
+    return read
 
 
-def seconds(text: str) -> float:
-    """Seconds to listen, at most an hour."""
-    with contextlib.suppress(ValueError):
-        if 0 < (duration := float(text)) <= 3600:
-            return duration
-    raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 3600")
-
-
-def gap(text: str) -> float:
-    """Seconds of silence in a log."""
-    with contextlib.suppress(ValueError):
-        if 0 <= (silence := float(text)) <= 86400:
-            return silence
-    raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 86400")
-
-
-def system(text: str) -> int:
-    """A MAVLink system id, 1 to 255."""
-    return _number(text, "a system id", 255)
+rate: Final = number(float, 0, 1000, "a rate; write a number of Hz up to 1000, 0 for none")
+seconds: Final = number(float, 1e-9, 3600, "a duration; write a number of seconds up to 3600")
+gap: Final = number(float, 0, 86400, "a duration; write a number of seconds up to 86400")
+system: Final = number(int, 1, 255, "a system id; write a number from 1 to 255")
+baud: Final = number(int, 1, 99_999_999, "a baud rate; write a number from 1 to 99999999")
 
 
 def named(text: str) -> tuple[tuple[int, int | None], str]:
@@ -151,15 +163,3 @@ def named(text: str) -> tuple[tuple[int, int | None], str]:
     if not is_vehicle_name(found[3]):
         raise argparse.ArgumentTypeError(f"{text!r}: a name has 1 to {LONGEST_NAME} printable characters")
     return (int(found[1]), None if found[2] is None else int(found[2])), found[3]
-
-
-def baud(text: str) -> int:
-    """Bits per second."""
-    return _number(text, "a baud rate", 99_999_999)
-
-
-def _number(text: str, what: str, most: int) -> int:
-    with contextlib.suppress(ValueError):
-        if 1 <= (number := int(text)) <= most:
-            return number
-    raise argparse.ArgumentTypeError(f"{text!r} is not {what}; write a number from 1 to {most}")

@@ -26,7 +26,7 @@ from ..json_object import JsonObject
 from ..language import remedy
 from ..links.log import Stamped
 from ..streams import NO_OUTPUT
-from . import applet, arming_checks
+from .vehicle_reports import PAGE, WORDS, applet_reports, arming_checks
 
 log = logging.getLogger(__name__)
 
@@ -126,9 +126,9 @@ def explanations(hw: HardwareInterface, vehicles: MavlinkRobotHW, now: Instant) 
     heard = list(filter(_is_heard, hw.handles))
     for handle in heard:
         hw.explain(handle.name, now)
-    reports = applet.reports(vehicles, now)
+    reports = applet_reports(vehicles, now)
     more: dict[str, JsonObject] = {name: {"applet": report} for name, report in reports.items()}
-    more |= {name: {"arming_checks": checks} for name, checks in arming_checks.reports(vehicles).items()}
+    more |= {name: {"arming_checks": checks} for name, checks in arming_checks(vehicles).items()}
     speak = {tracked.handle.name: senders(tracked.belief, now.mono) for tracked in vehicles.vehicles}
     return [
         explanation(handle, now)
@@ -210,8 +210,8 @@ def _member(cause: JsonObject) -> str:
 
 def _report(report: JsonObject | None) -> str:
     if report is None:
-        return f"not heard: {applet.PAGE}"
-    return f"RS_STOP {report['value']}, {applet.WORDS[report['value']]}, {report['age']:.1f} s ago"
+        return f"not heard: {PAGE}"
+    return f"RS_STOP {report['value']}, {WORDS[report['value']]}, {report['age']:.1f} s ago"
 
 
 def _said(text: str | None) -> str:

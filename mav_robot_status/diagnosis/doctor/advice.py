@@ -14,7 +14,7 @@ from ...clock import rfc3339
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_ARDUPILOTMEGA, MAV_AUTOPILOT_PX4
-from ..applet import PAGE, WORDS
+from ..vehicle_reports import PAGE, WORDS
 from .findings import HEARTBEAT, Findings, Speaker
 from .heard import duration
 

@@ -29,8 +29,8 @@ from ...mavlink.component import DEFAULT_SYSTEM, Component
 from ...mavlink.counters import Counters
 from ...mavlink.framing import Frame, Parser
 from ...streams import NO_OUTPUT
-from .. import applet
 from ..explain import silent
+from ..vehicle_reports import can_run
 from . import probes
 from .advice import protocol
 from .collector import Collector
@@ -179,7 +179,7 @@ def _status(hw: MavlinkRobotHW, tracked: TrackedVehicle, now: Instant) -> Vehicl
         explained["vehicle"].get("firmware"),
         costly=tracked.costly,
         name=tracked.name,
-        can_run_applet=applet.can_run(state) and not tracked.costly,
+        can_run_applet=can_run(state) and not tracked.costly,
         senders=senders(tracked.belief, now.mono),
         strangers=strangers(tracked.belief, now.mono, hw.options.heartbeat_timeout),
     )

@@ -13,8 +13,7 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
 from ..error_reporter import ErrorReporter
-from .client import Will, dial, make, shut
-from .reasons import lost, refusal, words
+from .client import Will, dial, lost, make, refusal, shut, words
 from .settings import Broker
 
 FIRST_WAIT, LONGEST_WAIT = 1.0, 30.0  # s between two attempts; doubled each time, with jitter

@@ -157,7 +157,7 @@ class Belief:
         if message is None:
             return Heard(Verdict.LATE if place < 0 else Verdict.NEWS, speaker)
         if message_id not in SAID_ONCE and not _is_newest(speaker, message_id, said, 0.0 if place < 0 else JITTER):
-            claims = message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and speaker.claim_late(message, at)
+            claims = message_id == HEARTBEAT_ID and speaker.claim_late(message, at)
             return Heard(Verdict.LATE, speaker if claims else None)
         speaker.said_at = max(speaker.said_at, said)
         when = now if said == at else now._replace(mono=said, unix_us=now.unix_us - round((at - said) * 1e6))
@@ -181,7 +181,8 @@ class Belief:
         known.heard_on(channel, now)
         if original.heard_in.channel is channel or any(count.speaker is known for count in counts):
             return
-        nearest = min(counts, key=lambda count: count.distance(sequence), default=None)
+        spoke = (count for count in counts if now - count.at <= LATE_FOR)
+        nearest = min(spoke, key=lambda count: count.distance(sequence), default=None)
         if nearest is not None and nearest.distance(sequence) <= MAX_MISORDER and known in self.speakers:
             other: Speaker = nearest.speaker
             other.copies[known] = other.copies.get(known, 0) + 1
@@ -337,6 +338,7 @@ class Belief:
         self.speakers.remove(young)
         if young is self.main:
             self.main = old
+        old.kept.extend(young.kept)  # it may itself be proven to be another one
         self.changes.append(Joined(old, tuple(young.kept), booted))
 
     def _break(self, speaker: Speaker, counts: Iterable[Count], now: float) -> None:
@@ -497,8 +499,8 @@ def _is_sparse(counts: Sequence[Count], clock: float | None, beat: Heartbeat | N
     """Whether a frame that continues no count is one more gap in that of the only speaker of the channel."""
     speaker: Speaker = counts[0].speaker
     alone = all(count.speaker is speaker for count in counts)
-    if beat is not None and speaker.armed and not may_move(beat):
-        return False  # what is dangerous to believe needs a proof
+    if beat is not None and speaker.armed is not may_move(beat):
+        return False  # a second vehicle would say so, too
     return alone and speaker.is_sparse(now) and (clock is None or speaker.clock.fits(clock, now))
 
 

@@ -6,11 +6,10 @@ facts, because each message changes them; `evidence` reads them from the state.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...interface.status import TriState
 from ...mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from ...mavlink.definitions import Heartbeat

@@ -5,18 +5,15 @@ from __future__ import annotations
 import hashlib
 import os
 import ssl
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
 from ...interface.options import Option, Options, short
 from ...user_files import read_secret, state_folder
-from ...values import NamedTuple
 from .naming import places
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 EXAMPLE: Final = "mqtts://broker.example/robots"
 PASSWORD: Final = "MAV_ROBOT_STATUS_MQTT_PASSWORD"

@@ -5,9 +5,7 @@ fails at import.
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING
-
-from ....values import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import re

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....interface.status import ErrorCause
 from ....mavlink.enumerations import MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
-from ....values import NamedTuple
 from .. import causes
 from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 from .simulation import is_simulated

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from math import inf
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED, MAV_STATE_CRITICAL
-from ....values import NamedTuple
 
 if TYPE_CHECKING:
     from ....clock import Instant

@@ -9,11 +9,10 @@ grows. A motor that is switched off while armed, without such proof, is only a r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from ....mavlink import enumerations as mavlink
-from ....values import dataclass
 from ..identity import PLANE, ROVER, Family
 
 if TYPE_CHECKING:

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....clock import Instant
 from ....mavlink.enumerations import MAV_VTOL_STATE_MC, MAV_VTOL_STATE_UNDEFINED
-from ....values import NamedTuple, dataclass
 from ..autopilots import announced_as
 from ..identity import FIXED_PITCH, Family, family_of, sensor_name
 from . import (

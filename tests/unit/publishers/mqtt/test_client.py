@@ -5,7 +5,7 @@ import ssl
 
 import pytest
 
-from mav_robot_status.publishers.mqtt.reasons import OTHER, lost, unreachable
+from mav_robot_status.publishers.mqtt.client import OTHER, lost, unreachable
 from mav_robot_status.publishers.mqtt.settings import read_broker
 
 PLAIN = read_broker({"url": "mqtt://127.0.0.1/x"})

@@ -126,22 +126,7 @@ def _use(
     """One message changes the state of a speaker."""
     state: VehicleState | None = speaker.state
     if message_id in (HEARTBEAT_ID, HIGH_LATENCY_ID):
-        beat = message if message_id == HEARTBEAT_ID else stated(message)
-        if not is_autopilot(beat, tracked.component):
-            return
-        if state is not None and message_id == HIGH_LATENCY_ID and not _adds(state, message, said, options):
-            _compare(speaker, state, beat, said)
-            return
-        speaker.claim(beat, said)
-        is_first = state is None
-        if state is None:
-            if tracked.belief.starts(speaker, lambda old: _says_that_it_starts(speaker, old, beat), said.mono):
-                return
-            state = speaker.state = begin(beat, said)
-            state.event_table, state.arrived = tracked.event_table, said.mono
-        state.timeout = getattr(speaker.channel, "heartbeat_timeout", None)
-        if is_first and message_id == HEARTBEAT_ID:
-            return
+        state = _claim(tracked, speaker, message_id, message, said, options)
     if state is None:
         return
     if speaker.clock.booted is not None:
@@ -150,6 +135,28 @@ def _use(
         high_latency(state, message, said, options)
     elif (handler := HANDLERS_BY_ID.get(message_id)) is not None:
         handler(state, message, said, options)
+
+
+def _claim(
+    tracked: TrackedVehicle, speaker: Speaker, message_id: int, message: Any, said: Instant, options: HardwareOptions
+) -> VehicleState | None:
+    """A HEARTBEAT, or what stands for one, claims the ids. Returns the state that it changes, if it changes one."""
+    state: VehicleState | None = speaker.state
+    beat = message if message_id == HEARTBEAT_ID else stated(message)
+    if not is_autopilot(beat, tracked.component):
+        return None
+    if state is not None and message_id == HIGH_LATENCY_ID and not _adds(state, message, said, options):
+        _compare(speaker, state, beat, said)
+        return None
+    speaker.claim(beat, said)
+    is_first = state is None
+    if state is None:
+        if tracked.belief.starts(speaker, lambda old: _says_that_it_starts(speaker, old, beat), said.mono):
+            return None
+        state = speaker.state = begin(beat, said)
+        state.event_table, state.arrived = tracked.event_table, said.mono
+    state.timeout = getattr(speaker.channel, "heartbeat_timeout", None)
+    return None if is_first and message_id == HEARTBEAT_ID else state
 
 
 def _adds(state: VehicleState, message: Any, said: Instant, options: HardwareOptions) -> bool:

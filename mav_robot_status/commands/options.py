@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import os
 import re
 import sys
@@ -161,9 +162,9 @@ def verbosity(parser: argparse.ArgumentParser) -> None:
 
 
 def rate(text: str) -> float:
-    """Hz; 0 for none. Raises ArgumentTypeError, like the functions below."""
+    """Hz; 0 or less for none. Raises ArgumentTypeError, like the functions below."""
     with contextlib.suppress(ValueError):
-        if 0 <= (hertz := float(text)) <= 1000:
+        if -math.inf < (hertz := float(text)) <= 1000:
             return hertz
     raise argparse.ArgumentTypeError(f"{text!r} is not a rate; write a number of Hz up to 1000, 0 for none")
 

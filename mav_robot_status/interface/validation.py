@@ -17,15 +17,26 @@ IDS: Final = range(256)
 TRUE, FALSE = TriState.TRUE, TriState.FALSE
 
 
-def validate(status: RobotStatus, detail: Detail | None = None, *, stops_cut_power: bool = True) -> str | None:
+def assumptions(hardware: object) -> dict[str, bool]:
+    """What a hardware interface says about power, as arguments of `validate`."""
+    return {name: bool(getattr(hardware, name, True)) for name in ("stops_cut_power", "motion_needs_power")}
+
+
+def validate(
+    status: RobotStatus,
+    detail: Detail | None = None,
+    *,
+    stops_cut_power: bool = True,
+    motion_needs_power: bool = True,
+) -> str | None:
     """The first invariant that a status and its detail violate, as a sentence; None if they are valid.
 
     A value of the wrong type is reported with the name of its field. Without a detail, the status alone is checked.
-    `stops_cut_power` is that of the hardware interface.
+    `stops_cut_power` and `motion_needs_power` are those of the hardware interface.
     """
     found = _wrong_type(status) or (None if detail is None else _wrong_detail(detail))
     if found is None and (detail is None or not detail.members):
-        found = _powered_in_part(status, stops_cut_power)
+        found = _powered_in_part(status, stops_cut_power, motion_needs_power)
     return found or _broken(status) or (None if detail is None else _contradiction(status, detail))
 
 
@@ -45,11 +56,11 @@ def _wrong_type(status: object) -> str | None:
 _ENUMS: Final = {Kind.MODE: RobotMode, Kind.TRI_STATE: TriState}
 
 
-def _powered_in_part(status: RobotStatus, stops_cut_power: bool) -> str | None:
+def _powered_in_part(status: RobotStatus, stops_cut_power: bool, motion_needs_power: bool) -> str | None:
     """The invariants of a single robot. In a group some parts may be stopped while others are powered."""
     if stops_cut_power and status.e_stopped is TRUE and status.drives_powered is not FALSE:
         return "I1: e_stopped is TRUE, so drives_powered must be FALSE"
-    if status.drives_powered is FALSE and status.motion_possible is not FALSE:
+    if motion_needs_power and status.drives_powered is FALSE and status.motion_possible is not FALSE:
         return "I2: drives_powered is FALSE, so motion_possible must be FALSE"
     return None
 

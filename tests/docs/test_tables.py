@@ -298,3 +298,10 @@ def test_each_test_that_the_threat_model_names_exists() -> None:
         places = (ROOT / "tests" / folder / file for folder in ("system", "unit/gateway", "unit/hardware/mavlink"))
         source = next(place for place in places if place.exists()).read_text("utf-8")
         assert [name for name in re.findall(r"`(\w+)`", names) if f"def {name}(" not in source] == []
+
+
+@pytest.mark.parametrize("first", ["parameter", "where"])
+def test_each_line_about_the_original_controller_names_its_test(first: str) -> None:
+    tests = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    for row in table("docs/explanation/controller.md", first):
+        assert f"def {row[-1]}(" in tests, row

@@ -45,6 +45,8 @@ class SimpleMessageRobotHW(RobotHW):
     options_type = SimpleMessageHardwareOptions
     stops_cut_power = False
     """An arm may brake under power: e_stopped comes before drives_powered FALSE."""
+    motion_needs_power = False
+    """A controller may switch the drives on for a motion command."""
 
     def __init__(self, context: HardwareContext) -> None:
         super().__init__()

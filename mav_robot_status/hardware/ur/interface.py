@@ -21,7 +21,7 @@ from ...interface import (
 )
 from ..tcp_source import FaultLog, TcpSource
 from .dashboard import Dashboard
-from .rtde import ProtocolError, Session
+from .rtde import ProtocolError, Session, Step
 from .status import NAMES, Context, Joints, Sample, sample_of, values_of
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ RATE: Final = 10.0
 """Samples a second."""
 SILENCE: Final = 3.0
 """Seconds without a sample after which the link is lost, and a connection is of no use."""
+ANSWER: Final = 1.0
+"""Seconds to wait for the version of the controller, which only a person reads."""
 ASSUMED: Final = {"none": RobotMode.UNKNOWN, "auto": RobotMode.AUTO, "manual": RobotMode.MANUAL}
 
 
@@ -67,6 +69,8 @@ class UrRobotHW(RobotHW):
         self._dashboard = Dashboard()
         self._sample_by = math.inf
         """When the connection is given up, unless a sample arrives before: monotonic seconds."""
+        self._go_on_at = math.inf
+        """When the session goes on without the version of the controller: monotonic seconds."""
         self._sample: Sample | None = None
         self._joints = Joints()
         self._name, self._log = context.name, FaultLog(context.name)
@@ -92,6 +96,7 @@ class UrRobotHW(RobotHW):
         heard = self._robot.heard_at
         due = math.inf if heard is None or self._sample is None else heard + SILENCE
         due = math.nextafter(min(due, self._sample_by), math.inf)
+        due = min(due, self._go_on_at)
         if self._dash is not None and self._dash.link.connected:
             due = min(due, self._dashboard.ask_at)
         return due
@@ -118,7 +123,7 @@ class UrRobotHW(RobotHW):
         if self._rtde is None or self._dash is None:
             return
         if self._rtde.is_new():
-            self._session, self._sample_by = Session(NAMES, RATE), now.mono + SILENCE
+            self._session, self._sample_by, self._go_on_at = Session(NAMES, RATE), now.mono + SILENCE, math.inf
         if self._dash.is_new():
             self._dashboard = Dashboard()
         if self._session is not None:
@@ -130,13 +135,17 @@ class UrRobotHW(RobotHW):
         """Send what the session asks. After SILENCE without a sample it is of no use."""
         if now.mono > self._sample_by:
             self._give_up(f"{session.step.value} did not arrive within {SILENCE:g} s", now)
-        elif session.sent and rtde.connected:
+            return
+        if now.mono >= self._go_on_at:
+            session.go_on()
+        if session.sent and rtde.connected:
             out, session.sent = session.sent, b""
             rtde.send(out)
+            self._go_on_at = now.mono + ANSWER if session.step is Step.CONTROLLER else math.inf
 
     def _give_up(self, why: str, now: Instant) -> None:
         """Nothing more of this connection counts. If it has already ended, the link has logged that."""
-        self._session, self._sample_by = None, math.inf
+        self._session, self._sample_by, self._go_on_at = None, math.inf, math.inf
         if self._rtde is not None and self._rtde.link.connected:
             self._log.fault(why, now.mono)
             self._rtde.link.reconnect()

@@ -7,6 +7,7 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from ...interface import RobotStatus
 from ...simple_message import StatusEncoder
 from ..listener import listen
 from .options import NAME, SimpleMessageOptions, read
@@ -72,5 +73,6 @@ class SimpleMessagePublisher:
         self._latest = b""
 
     def close(self) -> None:
-        """Close the port and all connections."""
+        """Tell every client that nothing is known any more; close the port and all connections."""
+        self._server.send(self._encoder.encode(RobotStatus()))
         self._server.close()

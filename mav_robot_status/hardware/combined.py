@@ -7,7 +7,7 @@ import math
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
-from ..interface import Detail, IndustrialRobotStatusHandle, LinkState, RobotHW
+from ..interface import GROUP, Detail, IndustrialRobotStatusHandle, LinkState, RobotHW, Vehicle
 from .group import combine, last_heard, member_of
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class CombinedRobotHW(RobotHW):
         self._outdated = True
         """Whether the groups have to be combined again."""
         for _, handle in self._groups:
-            handle.detail = Detail(link=LinkState.NEVER_SEEN)
+            handle.detail = Detail(vehicle=Vehicle(type=GROUP), link=LinkState.NEVER_SEEN)
             self.handles.register_handle(handle)
         self._collect()
 

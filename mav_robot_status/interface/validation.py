@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from .fields import FIELDS, STATES, Kind, RobotMode, RobotStatus, TriState
-from .status import Detail, ErrorCause, Inhibit, LinkState, Vehicle
+from .status import Detail, ErrorCause, Inhibit, LinkState, NotReady, Vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -138,6 +138,10 @@ def _are_words(value: object) -> bool:
     return isinstance(value, tuple) and all(isinstance(word, str) for word in value)
 
 
+def _is_not_ready(value: object) -> bool:
+    return isinstance(value, NotReady) and isinstance(value.handle, str) and isinstance(value.why, str)
+
+
 _MEMBERS: Final[tuple[tuple[str, Callable[[object], bool], str], ...]] = (
     ("system", _is_id, "an id from 0 to 255 or None"),
     ("component", _is_id, "an id from 0 to 255 or None"),
@@ -149,5 +153,6 @@ _MEMBERS: Final[tuple[tuple[str, Callable[[object], bool], str], ...]] = (
     ),
     ("vehicle", _is_vehicle, "a Vehicle"),
     ("link", lambda v: isinstance(v, LinkState), "a LinkState"),
-    ("members", lambda v: isinstance(v, tuple) and all(isinstance(i, str) for i in v), "a tuple of names of handles"),
+    ("members", _are_words, "a tuple of names of handles"),
+    ("not_ready", lambda v: isinstance(v, tuple) and all(map(_is_not_ready, v)), "a tuple of NotReady"),
 )

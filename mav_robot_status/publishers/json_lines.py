@@ -39,7 +39,7 @@ def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
         f"{_who(handle, detail.system, detail.component)}, {_fields(status)}, "
         f'"errors": {json.dumps(errors) if errors else "[]"}, '
         f'"inhibits": {json.dumps(inhibits) if inhibits else "[]"}, '
-        f'"vehicle": {_vehicle(detail.vehicle)}, {_group(detail.members)}"link": {{"state": "{detail.link.value}"'
+        f'"vehicle": {_vehicle(detail.vehicle)}, {_group(detail)}"link": {{"state": "{detail.link.value}"'
     )
     return body.replace("\x7f", r"\u007f")  # the one control character that JSON does not escape
 
@@ -62,9 +62,8 @@ def _vehicle(vehicle: Vehicle) -> str:
     return json.dumps(vehicle.members())
 
 
-@lru_cache(maxsize=256)
-def _group(members: tuple[str, ...]) -> str:
-    return f'"members": {json.dumps(members)}, ' if members else ""
+def _group(detail: Detail) -> str:
+    return "" if detail.ready is None else json.dumps(detail.group_members())[1:-1] + ", "
 
 
 def native(msg: RobotStatusMsg, seq: int, body: str) -> str:

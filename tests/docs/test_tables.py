@@ -176,7 +176,8 @@ def test_every_deviation_from_the_original_controller_is_listed() -> None:
         for path in package.rglob("*.py")
         for _ in re.findall(r"ORIGINAL: \w", path.read_text())
     )
-    listed = sorted(row[0].split(",")[0] for row in table("docs/explanation/controller.md", "where"))
+    places = [row[0].split(",")[0] for row in table("docs/explanation/controller.md", "where")]
+    listed = sorted(place for place in places if place.endswith(".py"))
     assert listed == in_code
 
 

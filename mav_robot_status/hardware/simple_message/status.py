@@ -1,7 +1,7 @@
 """A STATUS frame of simple_message as a RobotStatus with its reasons: pure functions.
 
 A controller may send any number. What has no meaning is UNKNOWN, and so are two values that contradict each other.
-By the definition of the message, motion may be possible without drive power: a controller switches it on when it needs it.
+By its definition, motion may be possible without drive power: a controller switches it on when it needs it.
 """
 
 from __future__ import annotations

@@ -5,18 +5,21 @@ The environment variable CYCLONEDDS_URI selects network interfaces, as it does f
 
 from __future__ import annotations
 
+import os
 import re
 import time
 from typing import TYPE_CHECKING, Any, Final
+from xml.sax.saxutils import quoteattr
 
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsSubscription
 from cyclonedds.core import DDSException
-from cyclonedds.domain import DomainParticipant
+from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
+from ...interface.options import short
 from .dds_types import TYPES, encoded
 from .transport import Endpoint, UnreachableError
 
@@ -29,6 +32,20 @@ PREFIX: Final = "rt"
 """What ROS 2 puts before the name of a topic."""
 DEPTH: Final = 10
 """Messages of a topic that wait for a slow reader; ROS 2's default."""
+MISSED: Final = 3.0
+"""A deadline is missed after this many periods."""
+LEASE: Final = 3.0  # s after which a subscriber knows that the gateway is gone
+COMPATIBLE: Final = "<Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></Compatibility>"
+"""1.15 is Fast DDS. Cyclone DDS rejects the type information of its version 3, and so every subscriber of Kilted."""
+LOOPBACK: Final = "127.0.0.1"
+LOCAL: Final = (
+    f'<General><Interfaces><NetworkInterface address="{LOOPBACK}"/></Interfaces>'
+    "<AllowMulticast>false</AllowMulticast></General>"
+)
+LOCAL_DISCOVERY: Final = (
+    "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
+)
+URI: Final = "CYCLONEDDS_URI"
 LONGEST: Final = 100  # ms for which a write may block
 DISCOVERY: Final = 2.0  # s in which other participants answer a new one
 MOST_ENDPOINTS: Final = 1000
@@ -45,7 +62,7 @@ class DdsTransport:
 
     def open(self) -> None:
         """Join the domain. Raises UnreachableError; Cyclone DDS then writes the cause to standard error."""
-        self._participant = join(self._settings.domain)
+        self._participant = join(self._settings)
 
     def lost(self) -> None:
         """Never: DDS has no connection."""
@@ -69,21 +86,41 @@ class DdsTransport:
     def _writer(self, sample: Sample) -> Any:
         found = self._writers.get(sample.topic)
         if found is None:
-            found = self._writers[sample.topic] = writer(self._participant, sample.topic, sample.type)
+            rate = self._settings.rate
+            found = self._writers[sample.topic] = writer(self._participant, sample.topic, sample.type, rate)
         return found
 
 
-def join(domain: int) -> Any:
+_DOMAINS: Final[dict[int, Any]] = {}
+"""The domains of this process. A domain has one configuration, and lives as long as the process."""
+
+
+def join(settings: Ros2Settings) -> Any:
     """A participant. Raises UnreachableError."""
+    domain = settings.domain
     try:
+        if domain not in _DOMAINS:
+            _DOMAINS[domain] = Domain(domain, configuration(settings))
         return DomainParticipant(domain)
-    except DDSException as error:
-        raise UnreachableError(f"cannot join: {error.msg or error}") from None
+    except (DDSException, UnicodeEncodeError) as error:
+        why = getattr(error, "msg", None) or str(error)
+        given = os.environ.get(URI)
+        blamed = f"; is {URI}={short(given, 200)} right?" if given and domain not in _DOMAINS else ""
+        raise UnreachableError(f"cannot join: {why}{blamed}") from None
+
+
+def configuration(settings: Ros2Settings) -> str:
+    """The configuration of our domain, and after it that of the user, which may be empty and goes before ours."""
+    addresses = (*([LOOPBACK] if settings.local else []), *settings.peers)
+    peers = "".join(f"<Peer address={quoteattr(address)}/>" for address in addresses)
+    discovery = (LOCAL_DISCOVERY if settings.local else "") + (f"<Peers>{peers}</Peers>" if peers else "")
+    ours = COMPATIBLE + (LOCAL if settings.local else "") + (f"<Discovery>{discovery}</Discovery>" if discovery else "")
+    return f"<CycloneDDS><Domain>{ours}</Domain></CycloneDDS>,{os.environ.get(URI, '')}"
 
 
 def subscriptions_of(settings: Ros2Settings) -> list[Endpoint]:
     """The subscriptions of other participants in the domain that announce themselves soon. Raises UnreachableError."""
-    participant = join(settings.domain)
+    participant = join(settings)
     reader = BuiltinDataReader(participant, BuiltinTopicDcpsSubscription)
     time.sleep(DISCOVERY)
     found = (_endpoint(settings.domain, sample) for sample in reader.take(MOST_ENDPOINTS))
@@ -100,12 +137,18 @@ def _endpoint(domain: int, sample: Any) -> Endpoint | None:
     return Endpoint(domain, "", name[len(PREFIX) :], sample.type_name or "", found[1].decode() if found else "")
 
 
-def writer(participant: Any, topic: str, kind: MessageType) -> Any:
-    """A writer with the quality of service that ROS 2 uses by default."""
+def writer(participant: Any, topic: str, kind: MessageType, rate: float) -> Any:
+    """A writer that every default subscriber of ROS 2 matches. A late one gets the last message at once.
+
+    `rate` in Hz says when a deadline is missed; 0: never.
+    """
     qos = Qos(
         Policy.Reliability.Reliable(duration(milliseconds=LONGEST)),
-        Policy.Durability.Volatile,
+        Policy.Durability.TransientLocal,
+        Policy.DurabilityService(0, Policy.History.KeepLast(1), -1, -1, -1),
         Policy.History.KeepLast(DEPTH),
+        Policy.Deadline(duration(seconds=MISSED / rate) if rate else duration(infinite=True)),
+        Policy.Liveliness.Automatic(duration(seconds=LEASE)),
         Policy.Userdata(f"typehash={kind.hash};".encode()),
     )
     found = Topic(participant, f"{PREFIX}{topic}", TYPES[kind.name], qos)

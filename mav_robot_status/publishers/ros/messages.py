@@ -48,7 +48,10 @@ DIAGNOSTIC_ARRAY: Final = MessageType(
 
 
 def robot_status(msg: RobotStatusMsg) -> bytes:
-    """industrial_msgs/msg/RobotStatus. frame_id is the name of the handle."""
+    """industrial_msgs/msg/RobotStatus.
+
+    ORIGINAL: leaves frame_id empty. Here it is the handle, because a gateway has several robots.
+    """
     encoder = Encoder()
     _header(encoder, msg.unix_us, msg.handle)
     for field, value in zip(FIELDS, msg.status, strict=True):

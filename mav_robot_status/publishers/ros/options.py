@@ -18,3 +18,4 @@ class Ros2Options(Options):
     namespace: Annotated[str, Option("namespace of the ROS 2 topics and node", "--ros2-namespace", "NAME")] = ""
     topic: Annotated[str, Option("name of the topic of each robot")] = "robot_status"
     rate: Annotated[float, Option("messages a second on each topic if nothing changes, Hz", low=0, high=1000)] = 1.0
+    hardware_status: Annotated[bool, Option("publish control_msgs/HardwareStatus too, for ros2_control")] = False

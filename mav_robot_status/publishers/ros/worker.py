@@ -8,7 +8,7 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, Final
 
-from ...interface import Inhibit, LinkState, RobotStatus, RobotStatusMsg
+from ...interface import Inhibit, RobotStatus, RobotStatusMsg
 from ...values import NamedTuple
 from ..error_reporter import ErrorReporter
 from .messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS, diagnostic_array, robot_status
@@ -215,6 +215,4 @@ class Worker:
 def unknown(msg: RobotStatusMsg, now: Instant) -> RobotStatusMsg:
     """The last message of a handle: the gateway stops, so nothing is known of the robot."""
     why = Inhibit("LINK_STALE", "the gateway has stopped", now.unix_us)
-    vehicle = msg.detail.vehicle._replace(flight_mode=None, custom_mode=None, state=None)
-    detail = msg.detail._replace(errors=(), inhibits=(why,), vehicle=vehicle, link=LinkState.LOST)
-    return RobotStatusMsg(msg.handle, now.unix_us, RobotStatus(), detail, None)
+    return RobotStatusMsg(msg.handle, now.unix_us, RobotStatus(), msg.detail.lost(why), None)

@@ -52,16 +52,14 @@ _GO: Final[dict[str, Any]] = {"velocity": _FORWARD, "throttle": 40}
 _STOP: Final[dict[str, Any]] = {"velocity": _HALT, "throttle": 0}
 
 ACTS: Final = (
-    _act(0.0, "the base is disarmed, the arm is ready: the robot as a whole cannot move", _stand),
+    _act(0.0, "the base is disarmed, the arm is ready: a part of the robot can move", _stand),
     _act(2.5, "the base is armed and drives its mission: the robot moves", armed=True, custom_mode=10, **_GO),
     _act(6.0, "the base has arrived and stands: the robot can move, and does not", **_STOP),
     _act(8.5, "the arm reaches: the robot moves again, although its base stands", _reach),
-    _act(
-        11.0, "emergency stop of the arm: motion is not possible; the base stays powered", FakeArm.press_emergency_stop
-    ),
+    _act(11.0, "emergency stop of the arm: the base is not stopped and may still move", FakeArm.press_emergency_stop),
     _act(13.5, "the base drives: one part is stopped, and another one moves", **_GO),
     _act(15.5, "the base stands again", **_STOP),
-    _act(17.5, "the arm is released and powered: motion is possible", _stand),
+    _act(17.5, "the arm is released and powered: no part is stopped", _stand),
     _act(19.5, "the radio of the base is cut while the arm reaches", _reach, action=Action.SILENCE),
     _act(25.0, "the base is heard again, and the arm stands: everything is known", _stand, action=Action.RESUME),
     _act(28.0, "the end", action=Action.END),

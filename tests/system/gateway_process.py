@@ -94,9 +94,13 @@ class Gateway:
         """Line number `count` after the instant `after`."""
         return self._until(lambda: [line for line in self.lines if line.at > after][count - 1 :], f"{count} lines")[0]
 
-    def wait_for_log(self, pattern: str) -> re.Match[str]:
+    def wait_for_log(self, pattern: str, seconds: float = SOON) -> re.Match[str]:
         """The first match of `pattern` in the log."""
-        return self._until(lambda: next((m for line in self.log if (m := re.search(pattern, line))), None), pattern)
+
+        def found() -> re.Match[str] | None:
+            return next((m for line in self.log if (m := re.search(pattern, line))), None)
+
+        return self._until(found, pattern, seconds)
 
     def wait_for_end(self, seconds: float = SOON) -> int:
         """The exit code."""

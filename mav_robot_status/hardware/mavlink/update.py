@@ -24,6 +24,7 @@ from .senders import LATE, stranger
 from .settle import facts_of
 from .settle.table import UNDISPUTED
 from .state import estop, motion
+from .state.heartbeat_history import missed
 from .state.high_latency import stated, tells_armed
 from .state.vehicle_state import VehicleState, begin, timeout_of
 
@@ -83,10 +84,14 @@ def _arrived(tracked: TrackedVehicle, speaker: Speaker, message: Any, at: float,
     if state is None:
         return
     is_heartbeat = type(message) is Heartbeat and is_autopilot(message, tracked.component)
-    if is_heartbeat or at - state.arrived <= timeout_of(state, options):
+    timeout, beat = timeout_of(state, options), state.latest.heartbeat
+    if is_heartbeat or at - state.arrived <= timeout:
         state.arrived = max(at, state.arrived)
+        if beat is not None and speaker.said_at - beat.at > timeout:
+            state.heartbeats = missed(state.heartbeats, at)
     if speaker.lost_since is not None:
         state.stop = estop.lost(state.stop, speaker.lost_since)
+        state.note_loss(speaker.lost_since)
         speaker.lost_since = None
 
 

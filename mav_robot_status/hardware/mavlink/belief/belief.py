@@ -61,7 +61,7 @@ SILENT: Final = 1.5
 More than the interval of HEARTBEATs: some senders send nothing else."""
 MOST_SPEAKERS: Final = 12
 MOST_NEW: Final = 2
-"""New speakers on one channel. A further count is a gap in the first of them."""
+"""New speakers on one channel that do not say armed. A further one takes the place of the first of them."""
 FORGOTTEN: Final = 25.0
 """Seconds of silence after which a speaker is forgotten, unless it is the main one."""
 
@@ -230,17 +230,16 @@ class Belief:
     ) -> Count:
         """A count for a frame that continues none: of the speaker whose frames the channel repeats, or of a new one."""
         echo = self._copies.echoes.get(channel)
-        new = [count for count in counts if not count.speaker.proven]
+        new = [count.speaker for count in counts if not count.speaker.proven and not count.speaker.armed]
         if not counts and echo is not None and echo.repeats(sequence, now):
             count = Count(echo.heard_in.speaker, channel, sequence, now, echo.heard_in)
         elif counts and _is_sparse(counts, clock, beat, now):
             count = Count(counts[0].speaker, channel, sequence, now)
             count.lag = counts[0].lag
             self._break(count.speaker, list(counts), now)
-        elif len(new) >= MOST_NEW:
-            self._drop_count(new[0])
-            count = Count(new[0].speaker, channel, sequence, now)
         else:
+            if len(new) >= MOST_NEW:
+                self._drop(new[0])
             count = Count(self._new_speaker(channel, now), channel, sequence, now)
         count.speaker.counts.append(count)
         if count.speaker not in self.speakers:

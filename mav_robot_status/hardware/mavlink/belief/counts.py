@@ -86,7 +86,8 @@ class Count:
             for number in range(self.index + 1, self.index + ahead):
                 if number not in self._used:
                     self._missing[number] = now, self.at
-            self._used.clear()
+            if self._used:
+                self._used = {number for number in self._used if number > self.index + ahead}
             self.changes = self.changes or self.index >= self._first
         self.index += ahead
         self.at = now
@@ -127,5 +128,8 @@ class Count:
 
     def said_behind(self, behind: int, latest: float) -> float:
         """When a late frame was said: just before the next number, at `latest`."""
-        self._missing.pop(self.index - behind, None)
-        return min(latest, self.said_after(behind) - JUST_BEFORE)
+        number = self.index - behind
+        self._missing.pop(number, None)
+        said = min(latest, self.said_after(behind) - JUST_BEFORE)
+        self._said = deque(sorted((*self._said, (number, said))), maxlen=self._said.maxlen)
+        return said

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from ....clock import Instant
 from ....mavlink.enumerations import MAV_VTOL_STATE_MC, MAV_VTOL_STATE_UNDEFINED
@@ -45,6 +45,9 @@ if TYPE_CHECKING:
     from .applet import Applet
     from .high_latency import HighLatency
 
+EXPLAINS: Final = 2.0
+"""Seconds around a disarm within which a text may tell why."""
+
 
 class Statement(NamedTuple):
     """A text of the autopilot, and when it was first sent."""
@@ -77,6 +80,12 @@ class VehicleState:
     """Whether `booted` is by its clock."""
     arrived: float = -math.inf
     """When the latest news of any kind arrived while the link was alive, monotonic seconds."""
+    lost_at: float = -math.inf
+    """Since when frames were lost, the latest time, monotonic seconds."""
+    disarmed_at: float | None = None
+    """When it was last disarmed in motion; None: it was armed since."""
+    unexplained: bool = False
+    """Whether it was disarmed in motion, and frames that may tell why are lost."""
     timeout: float | None = field(default=None, compare=False)
     """Seconds after which its link counts as lost, if the site says so. It is given from outside."""
     told_armed: float = -math.inf
@@ -178,6 +187,12 @@ class VehicleState:
         for name in self.__slots__:
             if name not in ("event_table", "timeout", "arrived"):
                 setattr(self, name, getattr(other, name))
+
+    def note_loss(self, since: float) -> None:
+        """Note that frames are lost since a time."""
+        self.lost_at = since
+        if self.disarmed_at is not None and abs(since - self.disarmed_at) <= EXPLAINS:
+            self.unexplained = True
 
     def show(self, profile: Autopilot) -> None:
         """Note that its software is this one, although it announces another one."""

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 from ...errors import UsageError
 from ...interface.options import short
 from ...values import NamedTuple
-from .naming import DIAGNOSTICS, is_name
+from .naming import DIAGNOSTICS, HARDWARE_STATUS, is_name
 from .options import Ros2Options
 
 if TYPE_CHECKING:
@@ -119,6 +119,8 @@ def _namespace(text: str) -> str:
 
 
 def _topic(options: Ros2Options) -> str:
+    if options.hardware_status and options.topic == HARDWARE_STATUS:
+        raise UsageError(f"ros2: topic: {HARDWARE_STATUS} is that of control_msgs/HardwareStatus; write robot_status")
     if not is_name(options.topic) or len(options.topic) > 100 or f"/{options.topic}" == DIAGNOSTICS:
         raise UsageError(
             f"ros2: topic: ROS does not allow {short(options.topic)} here; write a letter, then letters, digits and "

@@ -11,8 +11,15 @@ from typing import TYPE_CHECKING, Final
 from ...interface import Inhibit, RobotStatus, RobotStatusMsg
 from ...values import NamedTuple
 from ..error_reporter import ErrorReporter
-from .messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS, diagnostic_array, robot_status
-from .naming import DIAGNOSTICS, Topics
+from .messages import (
+    DIAGNOSTIC_ARRAY,
+    HARDWARE_STATUS,
+    ROBOT_STATUS,
+    diagnostic_array,
+    hardware_status,
+    robot_status,
+)
+from .naming import DIAGNOSTICS, Topics, beside
 from .transport import Sample, UnreachableError
 
 if TYPE_CHECKING:
@@ -47,6 +54,7 @@ class Worker:
         self._transport, self._clock = transport, clock
         self._errors = ErrorReporter("ros2", settings.name)
         self._topics = Topics(settings.namespace, settings.topic)
+        self._with_hardware_status = settings.hardware_status
         self._changed = threading.Condition()
         self._queue: deque[RobotStatusMsg | Gone] = deque()
         self._full = self._stop = False
@@ -187,10 +195,14 @@ class Worker:
 
     def _samples(self, msg: RobotStatusMsg) -> tuple[Sample, ...]:
         ns = msg.unix_us * 1000
-        return (
-            Sample(self._topics.of(msg.handle), ROBOT_STATUS, robot_status(msg), ns),
+        topic = self._topics.of(msg.handle)
+        samples = (
+            Sample(topic, ROBOT_STATUS, robot_status(msg), ns),
             Sample(DIAGNOSTICS, DIAGNOSTIC_ARRAY, diagnostic_array(msg), ns),
         )
+        if not self._with_hardware_status:
+            return samples
+        return (*samples, Sample(beside(topic), HARDWARE_STATUS, hardware_status(msg, self._latest), ns))
 
     def _forget(self, handle: str) -> None:
         self._latest.pop(handle, None)
@@ -200,6 +212,8 @@ class Worker:
             return
         try:
             self._transport.remove(topic)
+            if self._with_hardware_status:
+                self._transport.remove(beside(topic))
         except UnreachableError as error:
             self._lose(str(error))
 
@@ -207,8 +221,9 @@ class Worker:
         """Publish the remaining messages, then unknown statuses: ROS keeps no last message for others."""
         self._serve(self._take())
         now = self._clock()
-        for msg in list(self._latest.values()):
-            self._send(unknown(msg, now))
+        self._latest = {handle: unknown(msg, now) for handle, msg in self._latest.items()}
+        for msg in self._latest.values():
+            self._send(msg)
         self._transport.close()
 
 

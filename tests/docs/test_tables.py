@@ -35,7 +35,7 @@ from .documents import DOCUMENTS, ROOT, blocks, links, name_of, prose, table
 
 WHOLE = ("gateway", "views", "hardware", "publishers", "interface")
 """Folders whose every part is in the picture of the architecture page."""
-OTHER_TOOLS = {"--dialect", "--check", "--reference"}  # options of MAVProxy, ruff and chown
+OTHER_TOOLS = {"--dialect", "--check", "--reference", "--packages-select"}  # of MAVProxy, ruff, chown and colcon
 NO_KEYS = ("controllers", "interfaces", "names", "without_effect")
 """Fields of a configuration that are no keys: other keys at the top, parts of two lists, keys of former versions."""
 

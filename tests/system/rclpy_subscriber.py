@@ -4,9 +4,12 @@ TYPE is DiagnosticArray or another one of diagnostic_msgs. QUALITY: `default`, `
 (with a deadline and a lease, whose events are printed) or `strict` (a deadline that no gateway offers).
 """
 
+from __future__ import annotations
+
 import json
 import sys
 import time
+from typing import Any
 
 import diagnostic_msgs.msg
 import rclpy
@@ -17,18 +20,18 @@ from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 TOPIC = "/diagnostics"
 
 
-def say(**members):
+def say(**members: Any) -> None:
     print(json.dumps(members), flush=True)
 
 
-def heard(message):
+def heard(message: Any) -> None:
     for status in message.status:
         level = status.level[0] if isinstance(status.level, bytes) else status.level
         values = {value.key: value.value for value in status.values}
         say(level=level, message=status.message, hardware_id=status.hardware_id, values=values)
 
 
-def main(seconds, kind="DiagnosticArray", quality="default"):
+def main(seconds: str, kind: str = "DiagnosticArray", quality: str = "default") -> None:
     qos, events = QoSProfile(depth=10), None
     if quality == "late":
         qos.durability = DurabilityPolicy.TRANSIENT_LOCAL

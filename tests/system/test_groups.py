@@ -9,6 +9,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,7 +33,7 @@ ARM: Final = {
     "doubtful": (7, 0b11, 0, 1),
 }
 """robot_mode, robot_status_bits, safety_status_bits, safety_status."""
-ROWS: Final = (
+ROWS: Final[tuple[tuple[str, str, str, dict[str, str]], ...]] = (
     ("ready", "ready", "01100", {}),
     ("ready", "stopped", "?1100", {"arm": "E_STOPPED"}),
     ("ready", "protective", "01101", {"arm": "PROTECTIVE_STOP"}),
@@ -112,6 +113,10 @@ def file(tmp_path: Path, base: Base, arm: FakeArm) -> Path:
     return found
 
 
+def _is(expected: tuple[Any, ...], line: dict[str, Any]) -> bool:
+    return shown(line) == expected
+
+
 def shown(line: dict[str, Any]) -> tuple[Any, ...]:
     fields = tuple(line[name] for name in FIELDS)
     return fields, line["ready"], {one["handle"]: one["why"] for one in line["not_ready"]}
@@ -129,7 +134,7 @@ def test_every_combination_of_a_base_and_an_arm(
         changed = time.monotonic()
         expected = (tuple(VALUES[sign] for sign in fields), not not_ready, not_ready)
         line = gate.wait_for(
-            lambda line, expected=expected: shown(line) == expected,
+            partial(_is, expected),
             after=changed,
             seconds=20,
             what=f"base {of_base}, arm {of_arm}",

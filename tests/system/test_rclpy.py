@@ -38,6 +38,12 @@ def python_of(distribution: str) -> Path:
     return ROOT / "build" / f"ros-{distribution}" / "bin" / "python"
 
 
+def is_installed(distribution: str) -> bool:
+    """Whether its installation is complete."""
+    packages = ROOT / "build" / f"ros-{distribution}" / "lib" / "python3.11" / "site-packages"
+    return all((packages / name).exists() for name in ("rclpy", "diagnostic_msgs"))
+
+
 def reason(distribution: str) -> str:
     return NO_DDS or f"ros-{distribution}-rclpy is not installed in build/ros-{distribution}: .ci/run does that"
 
@@ -45,9 +51,7 @@ def reason(distribution: str) -> str:
 BOTH = pytest.mark.parametrize(
     "distribution",
     [
-        pytest.param(
-            name, marks=pytest.mark.skipif(not python_of(name).exists() or NO_DDS is not None, reason=reason(name))
-        )
+        pytest.param(name, marks=pytest.mark.skipif(not is_installed(name) or NO_DDS is not None, reason=reason(name)))
         for name in DISTRIBUTIONS
     ],
 )

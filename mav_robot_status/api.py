@@ -17,7 +17,7 @@ from .config import load as load_config
 from .errors import UsageError
 from .gateway.controller_config import DEFAULT_CONTROLLER
 from .gateway.event_loop import EventLoop
-from .gateway.recorded_log import Recording
+from .gateway.logs.recorded_log import Recording
 from .gateway.replay import ReplayPipeline, run_through
 from .links.url import parse
 from .publishers.queue import QueuePublisher

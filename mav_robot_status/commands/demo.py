@@ -8,9 +8,9 @@ import sys
 from typing import TYPE_CHECKING, Any, Final
 
 from ..errors import UsageError
-from ..publishers.ros.options import Ros2Options
+from ..publishers.ros.settings import Ros2Options
 from ..publishers.simple_message.options import SimpleMessageOptions
-from ..publishers.web.options import DEFAULT_LISTEN, HttpOptions
+from ..publishers.web.settings import DEFAULT_LISTEN, HttpOptions
 from .options import publisher, verbosity
 from .overrides import with_publisher
 

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 _NAMED: Final = re.compile(r"([0-9]{1,3})(?:\.([0-9]{1,3}))?=(.*)", re.ASCII | re.DOTALL)
 
 WITH_ARGUMENTS: Final = {
-    "http": (("--http", "--alarm"), "publishers.web.options", "HttpOptions"),
-    "mqtt": (("--mqtt",), "publishers.mqtt.options", "MqttOptions"),
+    "http": (("--http", "--alarm"), "publishers.web.settings", "HttpOptions"),
+    "mqtt": (("--mqtt",), "publishers.mqtt.settings", "MqttOptions"),
     "simple_message": (("--simple-message",), "publishers.simple_message.options", "SimpleMessageOptions"),
-    "ros2": (("--ros2",), "publishers.ros.options", "Ros2Options"),
+    "ros2": (("--ros2",), "publishers.ros.settings", "Ros2Options"),
 }
 """The publishers that the command line can add. For each: the beginnings of its flags, first that of the flag that
 enables it; and the class that declares its options."""

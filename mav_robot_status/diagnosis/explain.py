@@ -14,7 +14,7 @@ from ..clock import now as present
 from ..errors import UsageError
 from ..gateway.controller_config import DEFAULT_CONTROLLER
 from ..gateway.event_loop import EventLoop
-from ..gateway.recorded_log import Recording
+from ..gateway.logs.recorded_log import Recording
 from ..gateway.replay import ReplayPipeline, run_through
 from ..hardware.mavlink.senders import Sender, senders
 from ..interface import LinkState

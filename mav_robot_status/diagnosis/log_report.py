@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from ..gateway.logs.recorded_log import Recording
 from ..gateway.observer import Observer
-from ..gateway.recorded_log import Recording
 from ..gateway.replay import ReplayPipeline, run_through
 from ..interface import LinkState
 from ..streams import NO_OUTPUT

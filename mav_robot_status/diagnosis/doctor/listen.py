@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from ...clock import now as present
 from ...errors import LinkError
 from ...gateway.event_loop import EventLoop
-from ...gateway.recorded_log import Recording
+from ...gateway.logs.recorded_log import Recording
 from ...gateway.replay import ReplayPipeline, run_through
 from ...hardware.mavlink.autopilots.wanted import COMMON
 from ...hardware.mavlink.requests.message_intervals import LOOK, wanted_of

@@ -71,7 +71,10 @@ def on_frame(
     if speaker is None:
         return heard
     _arrived(tracked, speaker, frame[3], now.mono, options)
-    if said is not None:
+    if said is None:
+        if type(frame[3]) is Heartbeat and speaker.state is not None:  # late, and armed
+            speaker.state.told_armed = now.mono
+    else:
         _use(tracked, speaker, frame[0], frame[3], said, options)
         if tracked.belief.changes:
             _apply_changes(tracked, now, options)
@@ -106,7 +109,7 @@ def _apply_changes(tracked: TrackedVehicle, now: Instant, options: HardwareOptio
                 speaker.newest.clear()
             for message_id, message, said in change.kept:
                 newest = speaker.newest.get(message_id, -math.inf)
-                if message_id in SAID_ONCE or said.mono > newest:
+                if message_id in SAID_ONCE or said.mono >= newest:
                     speaker.newest[message_id] = max(said.mono, newest)
                     _arrived(tracked, speaker, message, said.mono, options)
                     _use(tracked, speaker, message_id, message, said, options)

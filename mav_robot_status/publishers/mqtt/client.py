@@ -10,8 +10,8 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from mav_robot_status.values import NamedTuple
 
-from .options import VERSIONS
 from .reasons import unreachable
+from .settings import VERSIONS
 
 if TYPE_CHECKING:
     from .settings import Broker

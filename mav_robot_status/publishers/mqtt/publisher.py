@@ -11,8 +11,7 @@ from ...clock import now as present
 from ...errors import UsageError
 from .lines import event_of, members_of
 from .naming import Naming
-from .options import MqttOptions
-from .settings import read
+from .settings import MqttOptions, read
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -9,8 +9,8 @@ from mav_robot_status.commands.options import WITH_ARGUMENTS, given, may_name, o
 from mav_robot_status.commands.overrides import configured, loaded, only, overridden, with_publisher
 from mav_robot_status.config import Config, ControllerConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
 from mav_robot_status.errors import UsageError
-from mav_robot_status.publishers.mqtt.options import BrokerOptions
-from mav_robot_status.publishers.web.options import HttpOptions
+from mav_robot_status.publishers.mqtt.settings import BrokerOptions
+from mav_robot_status.publishers.web.settings import HttpOptions
 
 from .said import said
 

@@ -20,6 +20,8 @@ SETTLES: Final = 1.0
 """Seconds after which a missing number is lost."""
 LOOK: Final = 0.2
 """Seconds between two looks at the missing numbers."""
+STANDS_STILL: Final = 10.0
+"""Seconds within which a sender whose number never changes is heard again."""
 SAME: Final = 256
 """The place of a frame of a sender whose number never changes."""
 JUST_BEFORE: Final = 1e-4  # s
@@ -54,7 +56,7 @@ class Count:
         if 0 < ahead <= MAX_DROPOUT + 1:
             return ahead
         if ahead == 0:
-            return None if self.changes else SAME
+            return None if self.changes or now - self.at > STANDS_STILL else SAME
         behind = 256 - ahead
         if behind > MAX_MISORDER or now - self.at > LATE_FOR:
             return None

@@ -138,6 +138,10 @@ def test_without_a_link_no_word_says_that_it_is_safe() -> None:
 
 def test_any_members_of_a_line_have_a_headline() -> None:
     odd: tuple[Any, ...] = (None, True, 3, "x", [], [3], {}, {"state": 7})
+    group = {"members": ["a", "b"], "ready": False, "not_ready": [{"handle": "a", "why": "E_STOPPED"}]}
+    for name, value in product(group, (*odd, [{"handle": ["a"], "why": ["x"]}], [{}])):
+        assert headline(line(**group) | {name: value}).word, (name, value)
+        assert headline(line(**LIVE, **group) | {name: value}).word, (name, value)
     for name, value in product(line(), odd):
         assert headline(line(**{name: value})).word, (name, value)
         assert headline(line(**LOST) | {name: value}, line(**{name: value})).word, (name, value)

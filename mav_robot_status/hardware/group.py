@@ -6,13 +6,16 @@ whose link is lost is UNKNOWN in every field, and so counts as UNKNOWN.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
 
 from ..interface import (
     GROUP,
     STATES,
     Detail,
+    ErrorCause,
     Evidence,
+    IndustrialRobotStatusHandle,
     Inhibit,
     LinkState,
     NotReady,
@@ -21,13 +24,7 @@ from ..interface import (
     TriState,
     Vehicle,
 )
-from ..values import NamedTuple
 from .join import Logic, join
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from ..interface import ErrorCause, IndustrialRobotStatusHandle
 
 MOTION_UNKNOWN: Final = "MOTION_UNKNOWN"
 """Why a member is not ready that does not say whether it can move."""

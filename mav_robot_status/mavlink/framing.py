@@ -14,18 +14,13 @@ from __future__ import annotations
 
 import struct
 from binascii import crc_hqx
-from typing import TYPE_CHECKING, Any, Final
-
-from mav_robot_status.values import NamedTuple
+from collections.abc import Collection, Sequence
+from typing import Any, Final, NamedTuple
 
 from .counters import Counters, count
+from .decode import Reader
 from .definitions import CRC_EXTRA
 from .wire import FORMATS, MAGIC, REVERSED, SIGNED, UNDO, UNKNOWN, V1, V2, known_ids
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
-    from .decode import Reader
 
 MAX_SOURCES: Final = 1024
 """The most (system, component) pairs that are checked for lost frames. Further ones are not."""

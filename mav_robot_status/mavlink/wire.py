@@ -7,19 +7,13 @@ from __future__ import annotations
 
 import re
 from binascii import crc_hqx
+from collections.abc import Callable
 from functools import lru_cache
 from struct import Struct
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, NamedTuple
 
-from mav_robot_status.values import NamedTuple
-
-from .decode import READERS
+from .decode import READERS, Reader
 from .definitions import CRC_EXTRA
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from .decode import Reader
 
 MAX_FRAME: Final = 280
 """Bytes of the longest frame: header 10, payload 255, CRC 2, signature 13."""

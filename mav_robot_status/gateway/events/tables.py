@@ -14,7 +14,7 @@ import logging
 import math
 from collections import OrderedDict
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...hardware.mavlink.autopilots.wanted import METADATA
 from ...hardware.mavlink.requests.scheduler import Ask
@@ -25,7 +25,6 @@ from ...mavlink.ftp.download import Failure
 from ...mavlink.ftp.payload import message, unpack
 from ...mavlink.ftp.table_download import TableDownload
 from ...paced_log import BURST, PacedLog
-from ...values import NamedTuple
 from .worker import Worker
 
 if TYPE_CHECKING:

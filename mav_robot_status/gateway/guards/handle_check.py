@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import Detail, Evidence, Inhibit, LinkState, RobotStatus, validate
 from ...interface.validation import assumptions
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -11,12 +11,11 @@ for new: a vehicle that was disarmed before the pause may be armed now.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...clock import Instant
 from ...links.base import DatedLink
 from ...links.stream import CHUNK
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

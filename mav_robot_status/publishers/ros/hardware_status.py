@@ -6,14 +6,11 @@ Pure functions.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple
 
 from ...interface import FIELDS, Detail, LinkState, RobotMode, RobotStatus, RobotStatusMsg, TriState
-from ...values import NamedTuple
 from .diagnostics import Level, level, reason_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 HEALTH_UNKNOWN, HEALTH_OK, HEALTH_WARNING, HEALTH_ERROR = 0, 1, 3, 4
 NONE, UNKNOWN_ERROR, STOP_HW, STOP_SW, PROTECTIVE_HW, PROTECTIVE_SW, SAFETY = 0, 1, 5, 6, 7, 8, 9

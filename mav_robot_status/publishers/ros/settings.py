@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
 from ...interface.options import Option, Options, short
-from ...values import NamedTuple
 from .naming import DIAGNOSTICS, HARDWARE_STATUS, is_name
 
 if TYPE_CHECKING:

@@ -6,10 +6,9 @@ import logging
 import random
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import Inhibit, RobotStatus, RobotStatusMsg
-from ...values import NamedTuple
 from ..error_reporter import ErrorReporter
 from .messages import (
     DIAGNOSTIC_ARRAY,

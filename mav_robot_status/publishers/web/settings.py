@@ -5,12 +5,11 @@ from __future__ import annotations
 import ipaddress
 import socket
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 from ...errors import UsageError
 from ...interface.options import Option, Options, short
 from ...user_files import read_secret
-from ...values import NamedTuple
 from ..listener import listen as open_listener
 from ..listener import place, resolve
 

@@ -14,8 +14,9 @@ from ..clock import now as present
 from ..errors import UsageError
 from ..gateway.controller_config import DEFAULT_CONTROLLER
 from ..gateway.event_loop import EventLoop
-from ..gateway.recorded_log import Recording
-from ..gateway.replay import ReplayPipeline, run_through
+from ..gateway.onboard_recording import OnboardRecording
+from ..gateway.replay import ReplayPipeline, open_recording, run_through
+from ..hardware.mavlink.interface import MavlinkRobotHW
 from ..hardware.mavlink.senders import Sender, senders
 from ..interface import LinkState
 from ..interface.explanation import explanation
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from typing import TextIO
 
     from ..config import Config
-    from ..hardware.mavlink.interface import MavlinkRobotHW
+    from ..gateway.recorded_log import Recording
     from ..interface import HardwareInterface, IndustrialRobotStatusHandle
     from ..json_object import JsonObject
     from ..links.log import Stamped
@@ -40,17 +41,36 @@ LISTEN: Final = 5.0
 ANSWERS: Final = 25.0
 """Seconds from the first heartbeat to the explanation while answers of the autopilot are outstanding. Its parameters
 take 17 s."""
+SINCE_BOOT: Final = "boot:"
 PATIENCE: Final = 30.0  # s to wait for the first heartbeat
 
 
 def explain_log(config: Config, path: str, at: str | None) -> list[JsonObject]:
     """The explanations at a time in a log, by default at its end.
 
-    `at` is an RFC 3339 time, or `+44` for seconds after the first record. Raises UsageError if the log lacks it.
+    `at` is an RFC 3339 time, `+44` for seconds after the first record, or, of an autopilot's own log, `boot:93` for
+    seconds after its start. Raises UsageError if the log lacks it.
     """
-    pipeline = ReplayPipeline(silent(config), NO_OUTPUT)
-    end = run_through(pipeline, _up_to(Recording(path), at))
-    return explanations(pipeline.hw, pipeline.vehicles, end)
+    recording = open_recording(path)
+    pipeline = ReplayPipeline(silent(config), NO_OUTPUT, recording=recording)
+    if at is not None and at.startswith(SINCE_BOOT):
+        at = _since_boot(recording, at)
+    end = run_through(pipeline, _up_to(recording, at))
+    if isinstance(pipeline.vehicles, MavlinkRobotHW):
+        return explanations(pipeline.hw, pipeline.vehicles, end)
+    pipeline.hw.read(end)
+    return [explanation(handle, end) for handle in pipeline.hw.handles if _is_heard(handle)]
+
+
+def _since_boot(recording: Recording | OnboardRecording, at: str) -> str:
+    """`boot:93` as RFC 3339. Raises UsageError."""
+    if not isinstance(recording, OnboardRecording):
+        raise UsageError(f"--at {at}: only an autopilot's own log (.bin, .ulg) tells when it has started; write +44")
+    try:
+        seconds = float(at.removeprefix(SINCE_BOOT))
+        return rfc3339(recording.preview.boot_unix_us + round(seconds * 1e6))
+    except (ValueError, OverflowError):
+        raise UsageError(f"--at {at}: write boot:93 for 93 seconds after the start of the autopilot") from None
 
 
 def _up_to(recording: Iterable[Stamped], at: str | None) -> Iterator[Stamped]:

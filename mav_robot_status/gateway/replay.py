@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import later
 from ..interface import LinkState
+from ..links.log import LogReader
 from .live_hardware import combined, open_interface
 from .mavlink_hardware import robot_hw
+from .onboard_recording import OnboardRecording, form_of
 from .pipeline import NEVER, Pipeline
 from .recorded_log import Recording
 
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config
+    from ..hardware.mavlink.interface import MavlinkRobotHW
+    from ..hardware.onboard_log.interface import OnboardLogRobotHW
     from ..interface import Audience
     from ..links.log import Stamped
     from .observer import Observer
@@ -58,9 +62,9 @@ def replay(config: Config, path: str, stdout: TextIO, *, raw: bool = False) -> N
 
     Raises UsageError if it cannot be read, BrokenPipeError if stdout is closed.
     """
-    recording = Recording(path, raw)
+    recording = open_recording(path, raw)
     log.info("replaying %s", path)
-    pipeline = ReplayPipeline(config, stdout)
+    pipeline = ReplayPipeline(config, stdout, recording=recording)
     try:
         pipeline.now = run_through(pipeline, recording)
     finally:
@@ -68,12 +72,27 @@ def replay(config: Config, path: str, stdout: TextIO, *, raw: bool = False) -> N
     log.info("%s", recording.summary())
 
 
+def open_recording(path: str, raw: bool = False) -> Recording | OnboardRecording:
+    """Open a log. Its first bytes decide what it is. Raises UsageError if it cannot be read."""
+    reader = LogReader(path)
+    form = None if raw else form_of(reader.head)
+    return Recording(reader, raw) if form is None else OnboardRecording(reader, form)
+
+
 class ReplayPipeline(Pipeline):
     """A pipeline for a recorded log."""
 
-    def __init__(self, config: Config, stdout: TextIO, observers: Sequence[Observer] = ()) -> None:
-        """Make the parts. Hardware interfaces other than MAVLink register their handles and open nothing."""
-        self.vehicles = robot_hw(config)
+    def __init__(
+        self,
+        config: Config,
+        stdout: TextIO,
+        observers: Sequence[Observer] = (),
+        recording: Recording | OnboardRecording | None = None,
+    ) -> None:
+        """Make the parts. Hardware interfaces other than that of the log register their handles and open nothing."""
+        self.vehicles: MavlinkRobotHW | OnboardLogRobotHW = (
+            recording.hardware(config) if isinstance(recording, OnboardRecording) else robot_hw(config)
+        )
         others = [open_interface(interface, replay=True, clock=lambda: self.now) for interface in config.interfaces]
         hw = combined(config, self.vehicles, others)
         self.max_gap = config.max_gap

@@ -23,6 +23,7 @@ from ..language import LOOKS, remedy, style_sheet
 from ..language.values import NO, UNKNOWN, YES
 from .timeline import TRACKS, Span
 from .totals import totals
+from .verdict import verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -70,6 +71,7 @@ def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> JsonObject:
             **({} if vehicle.name is None else {"name": vehicle.name}),
         },
         **({"members": list(vehicle.members)} if vehicle.members else {}),
+        "verdict": verdict(timeline, vehicle).members(),
         "totals": {
             "seconds": _seconds(whole.watched),
             "arm_cycles": len(whole.arm_cycles),

@@ -16,7 +16,6 @@ from ..gateway.controller_config import DEFAULT_CONTROLLER
 from ..gateway.event_loop import EventLoop
 from ..gateway.onboard_recording import OnboardRecording
 from ..gateway.replay import ReplayPipeline, open_recording, run_through
-from ..hardware.mavlink.interface import MavlinkRobotHW
 from ..hardware.mavlink.senders import Sender, senders
 from ..interface import LinkState
 from ..interface.explanation import explanation
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
 
     from ..config import Config
     from ..gateway.recorded_log import Recording
+    from ..hardware.mavlink.interface import MavlinkRobotHW
     from ..interface import HardwareInterface, IndustrialRobotStatusHandle
     from ..json_object import JsonObject
     from ..links.log import Stamped
@@ -56,10 +56,7 @@ def explain_log(config: Config, path: str, at: str | None) -> list[JsonObject]:
     if at is not None and at.startswith(SINCE_BOOT):
         at = _since_boot(recording, at)
     end = run_through(pipeline, _up_to(recording, at))
-    if isinstance(pipeline.vehicles, MavlinkRobotHW):
-        return explanations(pipeline.hw, pipeline.vehicles, end)
-    pipeline.hw.read(end)
-    return [explanation(handle, end) for handle in pipeline.hw.handles if _is_heard(handle)]
+    return explanations(pipeline.hw, pipeline.vehicles, end)
 
 
 def _since_boot(recording: Recording | OnboardRecording, at: str) -> str:

@@ -13,7 +13,7 @@ from ..hardware.onboard_log.dataflash import DataFlashReader
 from ..hardware.onboard_log.dataflash_text import TextReader
 from ..hardware.onboard_log.interface import OnboardLogRobotHW
 from ..hardware.onboard_log.ulog import MAGIC, ULogReader
-from ..interface import DEFAULT_HANDLE_NAME, Detail, IndustrialRobotStatusHandle, LinkState
+from ..interface import DEFAULT_HANDLE_NAME
 from ..links.log import LATEST, LogReader
 from ..values import NamedTuple
 
@@ -136,11 +136,6 @@ class OnboardRecording:
         hw = OnboardLogRobotHW(
             lambda: self.form.meaning(options), handle, options, name or config.names.get((system, None))
         )
-        for other in config.vehicles:
-            if other.handle != handle:
-                unheard = IndustrialRobotStatusHandle(other.handle)
-                unheard.detail = Detail(other.system, link=LinkState.NEVER_SEEN)
-                hw.handles.register_handle(unheard)
         self._hw = hw
         log.info("%s: a %s; the stamps are UTC %s", self.path, self.form.words, self.preview.clock)
         return hw

@@ -90,11 +90,13 @@ class ReplayPipeline(Pipeline):
         recording: Recording | OnboardRecording | None = None,
     ) -> None:
         """Make the parts. Hardware interfaces other than that of the log register their handles and open nothing."""
-        self.vehicles: MavlinkRobotHW | OnboardLogRobotHW = (
-            recording.hardware(config) if isinstance(recording, OnboardRecording) else robot_hw(config)
-        )
+        self.vehicles = robot_hw(config)
+        """Those of a log of MAVLink."""
+        own = recording.hardware(config) if isinstance(recording, OnboardRecording) else None
+        self.log_hw: MavlinkRobotHW | OnboardLogRobotHW = own or self.vehicles
+        """That of the log."""
         others = [open_interface(interface, replay=True, clock=lambda: self.now) for interface in config.interfaces]
-        hw = combined(config, self.vehicles, others)
+        hw = combined(config, self.log_hw, others)
         self.max_gap = config.max_gap
         self.source = next((RecordedLink(link.heartbeat_timeout) for link in config.links), RecordedLink(None))
         super().__init__(config, hw, NoMavlinkPort(), stdout, patient=True, observers=observers)
@@ -113,7 +115,7 @@ class ReplayPipeline(Pipeline):
 
 def run_through(pipeline: ReplayPipeline, recording: Iterable[Stamped]) -> Instant:
     """Feed a recording to the pipeline. Returns the last instant; everything due before it is done."""
-    hw = pipeline.vehicles
+    hw = pipeline.log_hw
     last = NEVER
     due = -math.inf  # time starts at the first record
     for now, frame, new_segment in recording:

@@ -43,7 +43,9 @@ VALUES: Final[dict[str, tuple[str, ...]]] = {
 """The values of each track. The totals list all of them, even those that never occurred."""
 LOOKS_OF: Final = {**LOOKS, "armed": {True: YES, False: NO, None: UNKNOWN}}
 """The looks of each track. A flight mode has its own name."""
-UNCERTAIN: Final = ("LINK_STALE", "SYS_STATUS_MISSING", "STOP_UNCERTAIN", "SENDER_UNCERTAIN", "HEARTBEAT_LATE")
+UNCERTAIN: Final = (
+    "LINK_STALE", "SYS_STATUS_MISSING", "STOP_UNCERTAIN", "SENDER_UNCERTAIN", "HEARTBEAT_LATE", "LOG_GAP"
+)  # fmt: skip
 """The inhibits that say why something is unknown, not why motion is not possible."""
 ESCAPES: Final = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&"})
 """Characters that could open or close an element; in JSON they occur in strings only."""

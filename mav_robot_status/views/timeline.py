@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..interface import Detail, Evidence, IndustrialRobotStatusHandle, RobotStatus
 
-UNTOLD: Final = {"HEARTBEAT_LATE", "SENDER_UNCERTAIN"}
+UNTOLD: Final = {"HEARTBEAT_LATE", "SENDER_UNCERTAIN", "LOG_GAP"}
 """Inhibits with which nobody knows whether the autopilot is armed."""
 TRACKS: Final = ("link", "flight_mode", "armed", *(field.name for field in STATES))
 """The tracks of each vehicle. A track has one value at a time."""

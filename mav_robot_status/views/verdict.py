@@ -149,7 +149,7 @@ def _crashes(log: _Log) -> Iterator[Found]:
 
 
 def _failures(log: _Log) -> Iterator[Found]:
-    """Disarmed or taken over by a failsafe; disarmed in the air; else the first error of an armed robot."""
+    """Disarmed or taken over by a failsafe; disarmed in the air; else the first error while it was armed."""
     for span in _disarms(log):
         if BY_ITSELF.search(span.rule or ""):
             yield "FAULT", f": disarmed{_air(log, span)} at {log.at(span.start)}{_why(span)}"
@@ -163,8 +163,16 @@ def _failures(log: _Log) -> Iterator[Found]:
     for span in _disarms(log):
         if _air(log, span) == " in the air" and not LANDED.search(span.rule or ""):
             yield "FAULT", f": disarmed in the air at {log.at(span.start)}{_why(span)}"
-    armed = [one for one in log.vehicle.errors if log.has("armed", "TRUE", one.start)]
-    for one in armed or log.vehicle.errors:
+    yield from _errors(log, [one for one in log.vehicle.errors if log.has("armed", "TRUE", one.start)])
+
+
+def _faults(log: _Log) -> Iterator[Found]:
+    """The first error of a robot that is not armed."""
+    yield from _errors(log, log.vehicle.errors)
+
+
+def _errors(log: _Log, errors: Sequence[Reason]) -> Iterator[Found]:
+    for one in sorted(errors, key=lambda one: one.start):
         word = "CONFLICT" if one.name in CONFLICTS else "FAULT"
         more = len({other.title for other in log.vehicle.errors}) - 1
         also = f"; {more} other {'errors' if more > 1 else 'error'}" if more else ""
@@ -198,7 +206,7 @@ def _refused(log: _Log) -> Iterator[Found]:
     lasted: dict[str, list[Reason]] = {}
     for one in refused:
         lasted.setdefault(one.text or "", []).append(one)
-    text, found = max(lasted.items(), key=lambda item: (bool(item[0]), sum(one.end - one.start for one in item[1])))
+    text, found = max(lasted.items(), key=lambda item: _weight(log, *item))
     end = found[-1].end
     until = "to the end" if end >= log.end - SECOND else f"to +{end / SECOND:.1f} s"
     told = f"“{_short(text)}”" if text else "its arming checks fail"
@@ -207,6 +215,11 @@ def _refused(log: _Log) -> Iterator[Found]:
         "CANNOT ARM",
         f": never armed in {_lasted(_heard(vehicle))}; {told} from {log.at(found[0].start)} {until}{more}",
     )
+
+
+def _weight(log: _Log, text: str, found: Sequence[Reason]) -> tuple[bool, bool, bool, int]:
+    """Which reason against arming counts most: one with words, at the end of the log, of an attempt, the latest."""
+    return bool(text), found[-1].end >= log.end - SECOND, text.startswith("Arm: "), found[-1].start
 
 
 def _quiet(log: _Log) -> Iterator[Found]:
@@ -230,7 +243,7 @@ def _quiet(log: _Log) -> Iterator[Found]:
 
 
 FINDERS: Final[tuple[Callable[[_Log], Iterator[Found]], ...]] = (
-    _stops, _crashes, _failures, _lost, _cut, _refused, _quiet
+    _stops, _crashes, _failures, _lost, _cut, _refused, _faults, _quiet
 )  # fmt: skip
 """In the order of importance: the first that finds something has the verdict."""
 

@@ -15,7 +15,6 @@ from ...gateway.event_loop import EventLoop
 from ...gateway.recorded_log import Recording
 from ...gateway.replay import ReplayPipeline, run_through
 from ...hardware.mavlink.autopilots.wanted import COMMON
-from ...hardware.mavlink.interface import MavlinkRobotHW
 from ...hardware.mavlink.requests.message_intervals import LOOK, wanted_of
 from ...hardware.mavlink.senders import senders, strangers
 from ...interface.explanation import explanation
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
 
     from ...clock import Instant
     from ...config import Config, LinkConfig
+    from ...hardware.mavlink.interface import MavlinkRobotHW
     from ...hardware.mavlink.vehicle import TrackedVehicle
     from ...links.log import Stamped
     from ...mavlink.counters import Counters
@@ -150,12 +150,10 @@ def _read(config: Config, base: Findings) -> Findings:
     collector = Collector()
     listener = Listener()
     pipeline = ReplayPipeline(config, NO_OUTPUT, observers=[listener])
-    vehicles = pipeline.vehicles
-    assert isinstance(vehicles, MavlinkRobotHW)  # a log of MAVLink
     last = run_through(pipeline, recording.frames_for(collector))  # the first record is at 0
     known = dataclasses.replace(base, seconds=round(last.mono, 1))
-    found = collector.findings(known, _statuses(vehicles, last), recording.counters())
-    handles = {tracked.ids: tracked.handle for tracked in vehicles.vehicles}
+    found = collector.findings(known, _statuses(pipeline.vehicles, last), recording.counters())
+    handles = {tracked.ids: tracked.handle for tracked in pipeline.vehicles.vehicles}
     speakers = (
         s._replace(heard=listener.heard(handles[s.system, s.component], last)) if s.status else s
         for s in found.speakers

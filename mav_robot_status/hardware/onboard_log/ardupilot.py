@@ -94,6 +94,7 @@ class ArduPilotMeaning:
 
     def doubt(self) -> None:
         """Records are missing here."""
+        self._begun_at_boot = False
         self.state.doubt()
 
     # -- who it is
@@ -303,7 +304,7 @@ class ArduPilotMeaning:
     def outputs(self, values: Values, now: Instant) -> bool:
         """RCOU."""
         learns = bool(self._begun_at_boot) and self.state.armed.value is not TRUE
-        driven = self._outputs.heard(values, learns)
+        driven, self.state.outputs_at = self._outputs.heard(values, learns), now.mono
         if driven is UNKNOWN or driven is self.state.driven.value or self.state.testing:
             return True
         rule = "a motor output is driven" if driven is TRUE else "no motor output is driven"

@@ -84,6 +84,11 @@ class DataFlashReader:
         """When the next record of a type is given."""
         self._life_due = 0
 
+    @property
+    def pending(self) -> int:
+        """Bytes of an incomplete record."""
+        return len(self._rest)
+
     def names(self) -> frozenset[str]:
         """The kinds of records that the log announces."""
         return frozenset(form.name for form in self._forms if form is not None)
@@ -140,8 +145,8 @@ class DataFlashReader:
         if form.wanted and (us >= self._due[kind] or (latest is not None and us < latest - form.every_us)):
             if form.is_numbered and data[position + HEAD_SIZE + 8]:
                 return
-            self._due[kind] = us + form.every_us
             self._give(form, data, position, us, out)
+            self._due[kind] = (self._clock.us or us) + form.every_us
         elif us >= self._life_due or latest is None or us < latest:
             self._clock.take(Record(us, SIGN_OF_LIFE, {}), out)
         self._life_due = (self._clock.us or 0) + LIFE_US

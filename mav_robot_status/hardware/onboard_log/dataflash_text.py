@@ -31,6 +31,11 @@ class TextReader:
         self._clock = Clock()
         self._rest = b""
 
+    @property
+    def pending(self) -> int:
+        """Bytes of an incomplete record."""
+        return len(self._rest)
+
     def names(self) -> frozenset[str]:
         """The kinds of records that the log announces."""
         return frozenset(self._forms)
@@ -76,8 +81,8 @@ class TextReader:
         self.counts.records += 1
         if name not in self._wanted or us < self._due.get(name, 0) or found.get("I") or found.get("C"):
             return
-        self._due[name] = us + round(self._wanted[name] * 1e6)
         self._clock.take(Record(us, name, found), out)
+        self._due[name] = (self._clock.us or us) + round(self._wanted[name] * 1e6)
 
 
 def _value(code: str, raw: str) -> Value:

@@ -66,13 +66,11 @@ class OnboardLogRobotHW(RobotHW):
         """When the last record was written."""
         self._ends_at = math.inf
         """When something in the state ends by itself."""
-        self.handles.register_handle(self._robot)
         self.forget()
 
     def forget(self) -> None:
         """No record was read."""
-        super().forget()
-        self._robot.detail = Detail(link=LinkState.NEVER_SEEN)
+        self.set_status(self._robot, RobotStatus(), Detail(link=LinkState.NEVER_SEEN), {})
         self.meaning = self._make()
         self._last, self.deadline, self._ends_at = None, math.inf, math.inf
 
@@ -84,6 +82,8 @@ class OnboardLogRobotHW(RobotHW):
     def take(self, record: Record, now: Instant, source: Any = None) -> None:
         """One record of the log."""
         last = self._last
+        if last is None and self._robot.name not in self.handles.get_names():
+            self.handles.register_handle(self._robot)
         if last is not None and now.mono - last > GAP:
             self.gaps += 1
             self.meaning.doubt()
@@ -93,6 +93,10 @@ class OnboardLogRobotHW(RobotHW):
         self._last = self._robot.heard_at = now.mono
         if not unchanged:  # records of the same time belong together: the next one of a later time shows the status
             self.deadline = min(self.deadline, math.nextafter(now.mono, math.inf))
+
+    def explain(self, handle: str, now: Instant) -> None:
+        """Update the evidence to `now`."""
+        self.read(now)
 
     def next_due(self, until: float = -math.inf) -> float:
         """After a change; when something ends by itself; when a gap begins."""

@@ -15,8 +15,10 @@ LIFE_US: Final = 250_000
 """The longest time between two records of a reader while the log goes on, microseconds."""
 BACK_US: Final = 5_000_000
 """Records are not strictly in the order of their times. A step back by more than this is a new start."""
-LEAP_US: Final = 10_000_000
+LEAP_US: Final = 500_000
 """A longer step forward counts only if the following record continues it."""
+CONTINUES_US: Final = 10_000_000
+"""The longest step from a record that leaps to the one that continues it."""
 
 
 class Record(NamedTuple):
@@ -46,6 +48,10 @@ class Reader(Protocol):
 
     counts: Counts
 
+    @property
+    def pending(self) -> int:
+        """Bytes of an incomplete record."""
+
     def feed(self, data: bytes) -> Sequence[Record]:
         """The records that are complete now and wanted."""
 
@@ -74,7 +80,7 @@ class Clock:
             self.us = us if latest is None else max(us, latest)
             out.append(record if us == self.us else record._replace(us=self.us))
             return
-        if self._held and -BACK_US <= us - self._held[-1].us <= LEAP_US:
+        if self._held and -BACK_US <= us - self._held[-1].us <= CONTINUES_US:
             self.us = max(us, self._held[-1].us)
             out += [*self._held, record._replace(us=self.us)]
             self._held = []
@@ -82,6 +88,6 @@ class Clock:
             self._held = [record]
 
     def finish(self) -> list[Record]:
-        """What waits at the end is not confirmed: it is left out."""
-        self._held = []
-        return []
+        """What waits at the end, if its time is plausible."""
+        held, self._held = self._held, []
+        return [one for one in held if self.us is not None and 0 <= one.us - self.us <= CONTINUES_US]

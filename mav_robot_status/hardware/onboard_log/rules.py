@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from .state import LogState
 
 
+SPOOL: Final = 0.5
+"""Seconds that motors need to stop."""
 DRIFT: Final = 3.0
 """The estimate of a copter on the ground may show a smaller speed, m/s. PX4 says landed while a disarmed one falls."""
 
@@ -53,21 +55,34 @@ def derive(state: LogState, options: HardwareOptions, now: Instant) -> Found:
     evidence["mode"] = evidence["flight_mode"] = Told(UNKNOWN, mode.why, mode.source, mode.at).evidence()
     evidence["armed"] = state.armed.evidence()
     inhibits = () if status.motion_possible is TRUE else tuple(_inhibits(state, status, options))
+    if status.motion_possible is UNKNOWN:
+        inhibits = (("LOG_GAP", drives.rule), *inhibits)
     return Found(status, errors, inhibits, evidence)
 
 
 def e_stopped(state: LogState, options: HardwareOptions) -> Told:
-    """As the log says."""
-    if state.stop.value is UNKNOWN and options.estop_unknown_as == "false":
+    """As the log says. An armed robot whose motors are driven all the same is not called stopped."""
+    stop = state.stop
+    if stop.value is UNKNOWN and options.estop_unknown_as == "false":
         return Told(FALSE, "estop_unknown_as: false")
-    return state.stop
+    if stop.value is TRUE and state.armed.value is TRUE and _is_driven(state):
+        return stop._replace(value=UNKNOWN, rule=f"{stop.rule}, but {state.driven.rule}")
+    return stop
+
+
+def _is_driven(state: LogState) -> bool:
+    """Whether a motor is driven; after a stop of an armed robot only if it is for longer than motors need to stop."""
+    if state.driven.value is not TRUE:
+        return False
+    is_test = state.testing or (state.armed.value is FALSE and state.armed.at < state.stop.at)
+    return state.stop.value is not TRUE or is_test or state.outputs_at >= state.stop.at + SPOOL
 
 
 def drives_powered(state: LogState, stop: Told, options: HardwareOptions) -> Told:
     """Armed and not held; or a motor output is driven, as in a motor test."""
     if state.hil and not options.treat_hil_as_live:
         return Told(FALSE, "hardware in the loop: actuators blocked", "vehicle_status.hil_state", state.mode.at)
-    if state.driven.value is TRUE and (state.armed.value is not TRUE or stop.value is TRUE):
+    if _is_driven(state) and (state.armed.value is not TRUE or state.stop.value is TRUE):
         return state.driven._replace(rule=f"{state.armed.rule}, but {state.driven.rule}")
     if state.armed.value is not TRUE:
         return state.armed
@@ -130,8 +145,7 @@ def in_error(state: LogState, errors: tuple[ErrorCause, ...]) -> Told:
 
 def _inhibits(state: LogState, status: RobotStatus, options: HardwareOptions) -> Iterator[tuple[str, str | None]]:
     """Every reason why motion is not possible."""
-    powered_by_test = state.driven.value is TRUE
-    if state.armed.value is FALSE and not powered_by_test:
+    if state.armed.value is FALSE and not _is_driven(state):
         yield "DISARMED", None
     if status.e_stopped is TRUE:
         yield "E_STOPPED", state.stop.rule.strip("“”") if state.stop.rule.startswith("“") else None

@@ -84,6 +84,8 @@ class LogState:
     rests: Told = Told(UNKNOWN, "no record shows rest")
     """Whether the autopilot finds that it is at rest, by its sensors of acceleration."""
     driven: Told = Told(UNKNOWN, "no record of the motor outputs")
+    outputs_at: float = -math.inf
+    """When the motor outputs were last seen."""
     testing: bool = False
     """Whether a motor test runs: between two motors none is driven."""
     ready: Told = Told(UNKNOWN, "no record of the arming checks")

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 MAGIC: Final = b"ULog\x01\x12\x35"
 HEADER_SIZE: Final = 16
 HEAD: Final = Struct("<HB")
-SYNC: Final = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
+SYNC: Final = b"\x08\x00S\x2f\x73\x13\x20\x25\x0c\xbb\x12"
+"""A message of synchronisation."""
+DEFINITIONS: Final = rb"..F[a-z]\w+:|..A...[a-z]\w{3}"
+"""How the definition of a format and a subscription begin, as a regular expression."""
 CODES: Final = {
     "int8_t": "b", "uint8_t": "B", "int16_t": "h", "uint16_t": "H", "int32_t": "i", "uint32_t": "I", "int64_t": "q",
     "uint64_t": "Q", "float": "f", "double": "d", "bool": "?", "char": "s",
@@ -33,7 +36,10 @@ MOST: Final = 4096
 """The limit of formats, and of the values of one format."""
 TIME: Final = Struct("<Q")
 DATA, DROPOUT, LOGGING, TAGGED = (ord(letter) for letter in "DOLC")
-TYPES: Final = frozenset(b"BFIMPQARDLCSO")
+LONGEST: Final = {
+    **dict.fromkeys(b"ORS", 8), **dict.fromkeys(b"LCAPQB", 1024), **dict.fromkeys(b"FIMD", 65535)
+}  # fmt: skip
+"""The most bytes of a message, by its type."""
 _ARRAY: Final = re.compile(r"(\w+)(?:\[(\d{1,4})\])?")
 
 
@@ -63,12 +69,21 @@ class ULogReader:
         self._formats: dict[str, str] = {}
         self._topics: dict[int, Topic | None] = {}
         """By their number in the log. None: not wanted."""
+        self._sizes: dict[int, range] = {}
+        """The bytes of the data of each topic."""
         self._names: set[str] = set()
+        self._begins: re.Pattern[bytes] | None = None
+        """How messages begin; None: to be made."""
         self._due: dict[int, int] = {}
         self._life_due = 0
         self._clock = Clock()
         self._rest = b""
         self._begun = False
+
+    @property
+    def pending(self) -> int:
+        """Bytes of an incomplete record."""
+        return len(self._rest)
 
     def names(self) -> frozenset[str]:
         """The topics that the log announces."""
@@ -89,12 +104,12 @@ class ULogReader:
         while position + 3 <= end:
             size, kind = head(data, position)
             after = position + 3 + size
-            if kind not in TYPES or not size:
+            if not 0 < size <= LONGEST.get(kind, 0) or (kind == DATA and not self._fits(data, position, size)):
                 position = self._skip(data, position)
                 continue
             if after + 3 > end:
                 break
-            if data[after + 2] in TYPES:
+            if data[after + 2] in LONGEST:
                 self._take(kind, data, position + 3, size, out)
                 position = after
             else:
@@ -112,21 +127,33 @@ class ULogReader:
             self.counts.bad_bytes += len(rest)
         return out + self._clock.finish()
 
+    def _fits(self, data: bytes, position: int, size: int) -> bool:
+        """Whether this may be the data of a topic."""
+        if position + 5 > len(data):
+            return True
+        return size - 2 in self._sizes.get(data[position + 3] | data[position + 4] << 8, ())
+
     def _skip(self, data: bytes, position: int) -> int:
-        """Where the next message may begin: a synchronisation, or the data of a topic."""
-        found = self._pattern().search(data, position + 1)
+        """Where the next message may begin: a definition, a synchronisation, or the data of a topic."""
         last = max(position + 1, len(data) - 4)
+        is_empty = not data[position:].strip(b"\0")  # a file that was cut off by a loss of power ends in zeros
+        found = None if is_empty else self._pattern().search(data, position + 1)
         after = found.start() if found else last
         self.counts.bad_bytes += after - position
         return after
 
     def _pattern(self) -> re.Pattern[bytes]:
-        known = [
-            (topic.size + 2).to_bytes(2, "little") + b"D" + number.to_bytes(2, "little")
-            for number, topic in self._topics.items()
-            if topic is not None
-        ]
-        return re.compile(b"|".join(re.escape(one) for one in [b"\x08\x00S" + SYNC, *known]), re.DOTALL)
+        if self._begins is None:
+            known = [
+                (sizes[-1] + 2).to_bytes(3, "little")[:2] + b"D" + number.to_bytes(2, "little")
+                for number, sizes in self._sizes.items()
+            ] + [
+                (sizes[0] + 2).to_bytes(3, "little")[:2] + b"D" + number.to_bytes(2, "little")
+                for number, sizes in self._sizes.items()
+            ]
+            fixed = b"|".join(re.escape(one) for one in dict.fromkeys([SYNC, *known]))
+            self._begins = re.compile(fixed + b"|" + DEFINITIONS, re.DOTALL)
+        return self._begins
 
     def _take(self, kind: int, data: bytes, start: int, size: int, out: list[Record]) -> None:
         self.counts.records += 1
@@ -150,14 +177,14 @@ class ULogReader:
         latest = self._clock.us
         if topic is None or us < self._due.get(number, 0):
             if us >= self._life_due or latest is None:
-                self._life_due = us + LIFE_US
                 self._clock.take(Record(us, SIGN_OF_LIFE, {}), out)
+                self._life_due = (self._clock.us or 0) + LIFE_US
             return
         if size - 2 < topic.size:
             return
-        self._due[number] = us + topic.every_us
         values = topic.layout.unpack_from(data[start + 2 : start + size].ljust(topic.layout.size, b"\0"))
         self._clock.take(Record(us, topic.name, {**_members(topic.members, values), "instance": topic.instance}), out)
+        self._due[number] = (self._clock.us or us) + topic.every_us
         self._life_due = (self._clock.us or 0) + LIFE_US
         if latest is not None and (self._clock.us or 0) < latest:
             self._due.clear()
@@ -200,23 +227,27 @@ class ULogReader:
 
     def _subscribe(self, instance: int, number: int, name: str) -> None:
         self._names.add(name)
-        self._topics[number] = None
-        if name not in self._wanted:
-            return
+        self._begins = None
+        self._topics[number], self._sizes[number] = None, range(1 << 16)
         members = self._flat(name, "", DEPTH)
         if not members or len(members) > MOST or members[0] != ("timestamp", "Q", 0):
             return
-        layout = Struct("<" + "".join(f"{count or ''}{code}" for _, code, count in members))
+        layout = _layout(members)
         shown = tuple((member, 0 if code == "s" else count) for member, code, count in members)
         padded = members
         while padded and padded[-1][0].startswith("_padding"):
             padded = padded[:-1]
-        size = Struct("<" + "".join(f"{count or ''}{code}" for _, code, count in padded)).size
+        size = _layout(padded).size
+        self._sizes[number] = range(size, layout.size + 1)
+        if name not in self._wanted:
+            return
         self._topics[number] = Topic(name, instance, size, layout, shown, round(self._wanted[name] * 1e6))
 
     def _flat(self, name: str, prefix: str, depth: int) -> list[tuple[str, str, int]]:
         """The members of a format with those of nested ones; empty if a format is not known or too large."""
         found: list[tuple[str, str, int]] = []
+        if not depth:
+            return found
         for member in filter(None, self._formats.get(name, "").split(";")):
             kind, _, label = member.partition(" ")
             parsed = _ARRAY.fullmatch(kind)
@@ -228,10 +259,14 @@ class ULogReader:
                 continue
             for index in range(count or 1):
                 inner = self._flat(parsed[1], f"{prefix}{label}{f'[{index}]' if count else ''}.", depth - 1)
-                if not inner or not depth or len(found) > MOST:
+                if not inner or len(found) > MOST:
                     return []
                 found += inner
         return found
+
+
+def _layout(members: Sequence[tuple[str, str, int]]) -> Struct:
+    return Struct("<" + "".join(f"{count or ''}{code}" for _, code, count in members))
 
 
 def _members(members: Sequence[tuple[str, int]], values: Sequence[int | float | bytes]) -> dict[str, Value]:

@@ -280,6 +280,8 @@ class ArduPilotMeaning:
         custom, reason = whole(values, "ModeNum", "Mode"), whole(values, "Rsn")
         key = self._family.value if self._family is not None else ""
         table = {} if self._family is None else tables.MODES[self._family]
+        if custom < 0:  # old logs in their text form have the name only
+            custom = next((n for n, (name, _) in table.items() if name == values.get("Mode")), custom)
         name, mode = table.get(custom, (f"CMODE({custom})", RobotMode.UNKNOWN))
         mode = self._options.mode_overrides.get(key, {}).get(custom, mode)  # type: ignore[call-overload]
         why = f"mode {name}" + ("" if reason < 0 else f", by {REASONS.get(reason, f'reason {reason}')}")

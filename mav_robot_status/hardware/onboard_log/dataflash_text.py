@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from .record import Value
 
 HEAD: Final = b"FMT,"
+OLD_TIMES: Final = {("T", "I"): 1000}
+"""The last column of GPS up to Copter 3.1, whose other records have no time: they have that of the last one."""
 LONGEST: Final = 4096
 """Bytes of a line. A longer one is no record."""
 TEXTS: Final = frozenset("nNZ")
@@ -71,21 +73,28 @@ class TextReader:
         types, columns = self._forms[name]
         if len(values) > len(columns) > 0 and types.endswith("Z"):  # a text may hold commas
             values[len(columns) - 1 :] = [", ".join(values[len(columns) - 1 :])]
-        unit = TIMES.get((columns[0], types[:1]), 0) if columns else 0
+        unit, at = (TIMES.get((columns[0], types[:1]), 0), 0) if columns else (0, 0)
+        if not unit and columns and (columns[-1], types[-1:]) in OLD_TIMES:
+            unit, at = OLD_TIMES[columns[-1], types[-1:]], -1
         try:
             found = {label: _value(code, one) for label, code, one in zip(columns, types, values, strict=True)}
-            us = int(values[0]) * unit if unit else self._clock.us or 0
+            us = int(values[at]) * unit if unit else self._clock.us or 0
         except ValueError:
             self.counts.bad_bytes += sum(map(len, values))
             return
         self.counts.records += 1
         if name not in self._wanted or us < self._due.get(name, 0) or found.get("I") or found.get("C"):
             return
-        self._clock.take(Record(us, name, found), out)
+        if unit or self._clock.us is None:
+            self._clock.take(Record(us, name, found), out)
+        else:
+            out.append(Record(us, name, found))
         self._due[name] = (self._clock.us or us) + round(self._wanted[name] * 1e6)
 
 
 def _value(code: str, raw: str) -> Value:
     if code in TEXTS or code == "a":
         return raw
+    if code == "M" and not raw.isdigit():
+        return raw  # the name of a mode
     return float(raw) if code in "fdgcCeEL" else int(raw)

@@ -14,6 +14,8 @@ from mav_robot_status.hardware.onboard_log.record import Reader, Record
 from mav_robot_status.hardware.onboard_log.ulog import ULogReader
 from tests.onboard_logs import dataflash, formats, message, record, ulog
 
+from .logs import at
+
 EVERY = dict.fromkeys(("ARM", "EV", "MSG", "GPS", "actuator_armed", "message"), 0.0)
 STORY = [(1 + n / 10, "EV", n % 200) for n in range(100)]
 BINARY = dataflash(*STORY)
@@ -26,7 +28,7 @@ READERS: dict[str, tuple[type[DataFlashReader] | type[ULogReader], bytes]] = {
 
 def read(reader: Reader, data: bytes, piece: int = 1 << 18) -> list[Record]:
     found = [one for start in range(0, len(data), piece) for one in reader.feed(data[start : start + piece])]
-    return [one for one in (*found, *reader.finish()) if one.name in EVERY or one.name in ("a",)]
+    return [one for one in (*found, *reader.finish()) if one.name not in ("", "information")]
 
 
 @pytest.mark.parametrize("name", READERS)
@@ -103,3 +105,24 @@ def test_dropouts_are_counted() -> None:
     reader = ULogReader(EVERY)
     read(reader, ulog((1, "O", 30), (2, "O", 5)))
     assert reader.counts.dropouts == 2
+
+
+def test_an_old_text_log_has_the_time_in_its_gps_records() -> None:
+    data = b"""FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format
+FMT, 130, 45, GPS, BIHf, Status,TimeMS,Week,Spd
+FMT, 130, 45, GPS, BIHfI, Status,TimeMS,Week,Spd,T
+FMT, 132, 67, MSG, Z, Message
+FMT, 3, 6, MODE, Mh, Mode,ThrCrs
+FMT, 13, 4, EV, B, Id
+GPS, 3, 1000, 1774, 0.1, 66000
+MSG, ArduCopter V3.1 (5c6503e2)
+MODE, STABILIZE, 352
+EV, 10
+GPS, 3, 1200, 1774, 0.1, 66200
+"""
+    found = read(TextReader({"GPS": 0.0, "MODE": 0.0, "EV": 0.0}), data)
+    assert [(one.name, one.us) for one in found] == [
+        ("GPS", 66_000_000), ("MODE", 66_000_000), ("EV", 66_000_000), ("GPS", 66_200_000),
+    ]  # fmt: skip
+    (said,) = at(data, 66.1)
+    assert (said.detail.vehicle.flight_mode, said.status.drives_powered) == ("STABILIZE", 1)

@@ -9,16 +9,16 @@ from mav_robot_status.clock import Instant
 from mav_robot_status.config.document import parse_document
 from mav_robot_status.config.reader import build
 from mav_robot_status.errors import ConfigError, UsageError
-from mav_robot_status.gateway.onboard_recording import DATAFLASH, DATAFLASH_TEXT, ULOG, form_of
+from mav_robot_status.gateway.logs.onboard_recording import DATAFLASH, DATAFLASH_TEXT, ULOG, form_of
+from mav_robot_status.hardware.mavlink.faults import text_assembly
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.px4_events import ARMING_SUMMARY, HEALTH_SUMMARY
 from mav_robot_status.hardware.mavlink.px4_events.ids import CAUSE_AT
 from mav_robot_status.hardware.mavlink.px4_events.parsing import TableError
 from mav_robot_status.hardware.mavlink.px4_events.parsing import parse as parse_table
-from mav_robot_status.hardware.mavlink.state import text_assembly
-from mav_robot_status.hardware.mavlink.state.event_sequence import ASKABLE, KEPT
+from mav_robot_status.hardware.mavlink.px4_events.sequence import ASKABLE, KEPT
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.hardware.onboard_log.interface import OnboardLogRobotHW
 from mav_robot_status.interface import validate
 from mav_robot_status.links.url import parse
@@ -91,7 +91,7 @@ def messages(data: bytes) -> int:
         message_id = 0 if count <= 3 else SOME[chunk[2] % len(SOME)]
         now = Instant(mono, int(mono * 1e6))
         (frame,) = parser.feed(enclose(message_id, chunk[3:], system=system, component=1, sequence=count & 255))
-        hw.take(frame, now)
+        hw.on_frame(frame, now)
         if mono >= hw.next_due():
             hw.read(now)
             hw.due_requests(now)
@@ -163,7 +163,7 @@ def events(data: bytes) -> int:
         beat = Heartbeat(4 << 16, 2, 12, 209, 4, 3)
         for number, message in enumerate((beat, _event(chunk, count))):
             (frame,) = parser.feed(encode(message, system=1, component=1, sequence=2 * count + number & 255))
-            hw.take(frame, now)
+            hw.on_frame(frame, now)
         hw.read(now)
         hw.due_requests(now)
     (tracked,) = hw.vehicles
@@ -199,7 +199,7 @@ def onboard_log(data: bytes) -> int:
                 hw.forget()
             mono, us = mono + min(max(record.us - us, 0), 10**9) / 1e6, record.us
             hw.begun(0.0, reader.names())
-            hw.take(record, Instant(mono, us))
+            hw.on_frame(record, Instant(mono, us))
             if mono >= hw.next_due():
                 hw.read(Instant(mono, us))
             form.utc_us(record.values)

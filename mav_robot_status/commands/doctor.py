@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
 from typing import TYPE_CHECKING
 
+from ..config import Config, LinkConfig
 from ..links.url import parse
-from ..publishers.ros.options import Ros2Options
+from ..publishers.ros.settings import Ros2Options
 from ..streams import say
 from .options import connections, given, looking, publisher, seconds
 from .overrides import configured
 
 if TYPE_CHECKING:
-    import argparse
-
-    from ..config import Config, LinkConfig
     from ..diagnosis.doctor.onboard import OnboardFindings
 
 
@@ -60,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
 def _onboard(config: Config, link: LinkConfig) -> OnboardFindings | None:
     """What an autopilot's own log holds; None for every other connection. Raises UsageError."""
     from ..diagnosis.doctor.onboard import examine
-    from ..gateway.onboard_recording import OnboardRecording
+    from ..gateway.logs.onboard_recording import OnboardRecording
     from ..gateway.replay import open_recording
 
     url = parse(link.url)

@@ -10,10 +10,10 @@ from ..clock import later
 from ..interface import LinkState
 from ..links.log import LogReader
 from .live_hardware import combined, open_interface
+from .logs.onboard_recording import OnboardRecording, form_of
+from .logs.recorded_log import Recording
 from .mavlink_hardware import robot_hw
-from .onboard_recording import OnboardRecording, form_of
 from .pipeline import NEVER, Pipeline
-from .recorded_log import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterable, Sequence
@@ -132,7 +132,7 @@ def run_through(pipeline: ReplayPipeline, recording: Iterable[Stamped]) -> Insta
         last = now
         if frame is None:
             continue
-        hw.take(frame, now, pipeline.source)
+        hw.on_frame(frame, now, pipeline.source)
         if hw.deadline == -math.inf:
             pipeline.tick(now)
             due = pipeline.next_due(now.mono)

@@ -6,23 +6,16 @@ The numbers of handles and transitions and their age are bounded.
 
 from __future__ import annotations
 
-import json
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator
+from typing import Final, NamedTuple
 
-from ..clock import rfc3339
-from ..interface import STATES
+from ..clock import Instant, rfc3339
+from ..interface import STATES, Publisher, PublisherContext, RobotStatusMsg
 from ..interface.options import Options
-from ..values import NamedTuple
-from .json_lines import native_body
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from ..clock import Instant
-    from ..interface import PublisherContext, RobotStatusMsg
-    from ..json_object import JsonMapping, JsonObject
+from ..json_object import JsonMapping, JsonObject
+from .json_lines import members
 
 MOST_HANDLES: Final = 4096
 MOST_MEMBERS: Final = 256
@@ -109,7 +102,7 @@ class Board:
         content = (msg.status, msg.detail)
         if self._seen.get(msg.handle) != content:
             self._seen[msg.handle] = content
-            self._change(entry, json.loads("{" + native_body(msg.handle, *content) + "}}"), stamp, now)
+            self._change(entry, members(msg.handle, *content), stamp, now)
         entry.stamp, entry.at = stamp, now
         entry.heartbeat_age = None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
 
@@ -174,7 +167,7 @@ class Board:
         entry.version = self.version
 
 
-class BoardPublisher:
+class BoardPublisher(Publisher):
     """Puts statuses on its board, for a view in the same process."""
 
     periodic = True
@@ -187,10 +180,6 @@ class BoardPublisher:
         self.lock = threading.Lock()
         """The lock of the board. Another thread must hold it to read the board."""
         self._waiting: list[RobotStatusMsg] = []
-
-    def busy(self) -> bool:
-        """Never."""
-        return False
 
     def publish(self, msg: RobotStatusMsg) -> None:
         """Hold the message until `service`, which follows every round of updates."""
@@ -208,9 +197,6 @@ class BoardPublisher:
         """Remove a handle that is gone from the board."""
         with self.lock:
             self.board.forget(handle)
-
-    def close(self) -> None:
-        """Nothing to release."""
 
 
 def _order(entry: Entry) -> tuple[bool, int, int, str]:

@@ -8,17 +8,13 @@ Autopilots with the same system id have one status: what they do not agree on is
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from ..interface import FIELDS, STATES, TRI_STATES, RobotMode, RobotStatus, TriState
+from ..interface import FIELDS, STATES, TRI_STATES, Audience, RobotMode, RobotStatus, RobotStatusMsg, TriState
 from ..mavlink.definitions import NamedValueInt, Statustext
 from .rate_limiter import RateLimitedPublisher, Schedule
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..interface import Audience, RobotStatusMsg
 
 VALUE_INTERVAL: Final = 2.0  # s
 TEXT_INTERVAL: Final = 2.0  # s, the minimum

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import rfc3339
-from ..values import NamedTuple
 from .totals import arm_cycles
 
 if TYPE_CHECKING:

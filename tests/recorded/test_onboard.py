@@ -12,7 +12,7 @@ import pytest
 from pymavlink import DFReader
 
 from mav_robot_status.config import Config
-from mav_robot_status.gateway.onboard_recording import OnboardRecording
+from mav_robot_status.gateway.logs.onboard_recording import OnboardRecording
 from mav_robot_status.gateway.replay import open_recording
 from mav_robot_status.hardware.onboard_log.dataflash import DataFlashReader
 from mav_robot_status.hardware.onboard_log.ulog import ULogReader

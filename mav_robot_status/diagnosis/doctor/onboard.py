@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...gateway.replay import ReplayPipeline, run_through
 from ...interface.explanation import explanation
 from ...streams import NO_OUTPUT
-from ...values import NamedTuple
 from ..explain import silent
 
 if TYPE_CHECKING:
     from ...config import Config
-    from ...gateway.onboard_recording import OnboardRecording
+    from ...gateway.logs.onboard_recording import OnboardRecording
     from ...json_object import JsonObject
 
 

@@ -1,16 +1,17 @@
 """The facts of a vehicle: the complete input of the rules. A new status is derived only when they change.
 
-`settle` makes them from the state. A rule can read nothing else, and every fact is compared. Times of arrival are not
-facts, because each message changes them; `evidence` reads them from the state.
+The subjects make them from the state, see `subjects`. A rule can read nothing else, and every fact is compared. Times
+of arrival are not facts, because each message changes them; the words of a `Reason` read them from the state.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from math import inf, nextafter
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface.status import TriState
 from ...mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
-from ...values import NamedTuple
+from .state import slowly_fresh_until
 
 if TYPE_CHECKING:
     from ...mavlink.definitions import Heartbeat
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from .autopilots.firmware import Firmware
     from .autopilots.modes import ModeHints
     from .identity import Family
+    from .state import Heard
 
 
 class Kind(NamedTuple):
@@ -73,6 +75,8 @@ class Outputs(NamedTuple):
     """Whether they are held at their stop value, for long enough, while throttle is demanded."""
     at_stop: bool
     """Whether each is at its stop value: then a turning motor is not driven."""
+    idle: bool
+    """Whether they stand at their stop value while throttle is demanded, without a proof that they are motors."""
 
 
 class Stop(NamedTuple):
@@ -84,6 +88,8 @@ class Stop(NamedTuple):
     """Whether the pre-arm checks, which fail while it is engaged, pass."""
     doubt: str | None
     """Why a stop may last, although no evidence of it counts any more."""
+    unexplained: bool
+    """Whether it was disarmed in motion, and frames that may tell why are lost."""
 
 
 class Applet(NamedTuple):
@@ -147,6 +153,9 @@ class Claimed(NamedTuple):
     """Unix microseconds. None: no conflict."""
     mixed: bool
     """Whether the two cannot be told apart, so that nothing is known."""
+
+
+UNDISPUTED: Final = Claimed(None, False)
 
 
 class Seldom(NamedTuple):
@@ -241,3 +250,37 @@ class Facts(NamedTuple):
     def armed(self) -> bool:
         """The only armed indication that exists."""
         return bool(self.heartbeat.base_mode & MAV_MODE_FLAG_SAFETY_ARMED)
+
+
+class Deadline:
+    """A time, in monotonic seconds.
+
+    Facts compare all other times through it. `next` is therefore the first time at which a fact may change without a
+    message, and no list of such times is needed.
+    """
+
+    __slots__ = ("next", "now")
+
+    def __init__(self, now: float) -> None:
+        self.now = now
+        self.next = inf
+
+    def has_come(self, at: float) -> bool:
+        """Whether it is `at` or later."""
+        if self.now >= at:
+            return True
+        if at < self.next:
+            self.next = at
+        return False
+
+    def is_within(self, limit: float) -> bool:
+        """Whether it is not later than `limit`."""
+        if self.now > limit:
+            return False
+        if limit < self.next:
+            self.next = nextafter(limit, inf)
+        return True
+
+    def is_fresh(self, what: Heard | None, least: float) -> bool:
+        """Whether `what` is not older than `least` seconds, or than three measured intervals if that is longer."""
+        return what is not None and (self.is_within(what.at + least) or self.is_within(slowly_fresh_until(what)))

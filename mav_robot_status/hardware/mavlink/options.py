@@ -6,12 +6,11 @@ The annotations are the schema from which the configuration is read and checked:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
-from typing import Annotated, Final, Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Final, Literal, NamedTuple
 
 from ...interface import RobotMode
 from ...mavlink.definitions import EXTENDED_SENSOR_NAMES, SENSOR_NAMES
-from ...values import NamedTuple, dataclass
 
 
 class Within(NamedTuple):
@@ -39,7 +38,7 @@ Hold = Annotated[float, Within(0.0, 3600.0, "s")]
 Speed = Annotated[float, Within(0.0, 100.0, "m/s")]
 CustomMode = Annotated[int, Within(0, 2**32 - 1)]
 ModeOverrides = Mapping[CustomMode, RobotMode]
-"""A file may write the name of a mode instead of its number, see `autopilots.mode_names`."""
+"""A file may write the name of a mode instead of its number, see `autopilots.mode_numbers`."""
 VehicleKey = Literal["copter", "plane", "rover", "sub", "tracker", "blimp", "px4", "other"]
 Path = Annotated[str | None, Or("none")]
 """A file."""

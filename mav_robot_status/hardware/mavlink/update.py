@@ -12,20 +12,19 @@ from .armed import is_armed
 from .belief.belief import SAID_ONCE, Heard, Joined
 from .belief.clock import Change
 from .derive import derive
-from .facts import Claimed
-from .handlers import HANDLERS_BY_ID, pass_time
-from .handlers.heartbeat import exchanged, rebooted, starts_anew
-from .handlers.high_latency import follows, high_latency, sends_heartbeats
+from .estop import state as estop
+from .facts import UNDISPUTED, Claimed, Deadline
+from .faults.texts import pass_time
+from .heartbeat.messages import exchanged, rebooted, starts_anew
+from .heartbeat.state import missed
 from .identity import is_autopilot
 from .joined import joined
-from .message_table import HEARTBEAT_ID, HIGH_LATENCY_ID
-from .moment import Moment
+from .motion import state as motion
+from .satellite.messages import follows, high_latency, sends_heartbeats
+from .satellite.state import stated, tells_armed
 from .senders import LATE, stranger
-from .settle import facts_of
-from .settle.table import UNDISPUTED
-from .state import estop, motion
-from .state.high_latency import stated, tells_armed
-from .state.vehicle_state import VehicleState, begin, timeout_of
+from .state import VehicleState, begin, timeout_of
+from .subjects import HANDLERS_BY_ID, HEARTBEAT_ID, HIGH_LATENCY_ID, facts_of
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -70,7 +69,10 @@ def on_frame(
     if speaker is None:
         return heard
     _arrived(tracked, speaker, frame[3], now.mono, options)
-    if said is not None:
+    if said is None:
+        if type(frame[3]) is Heartbeat and speaker.state is not None:  # late, and armed
+            speaker.state.told_armed = now.mono
+    else:
         _use(tracked, speaker, frame[0], frame[3], said, options)
         if tracked.belief.changes:
             _apply_changes(tracked, now, options)
@@ -83,10 +85,14 @@ def _arrived(tracked: TrackedVehicle, speaker: Speaker, message: Any, at: float,
     if state is None:
         return
     is_heartbeat = type(message) is Heartbeat and is_autopilot(message, tracked.component)
-    if is_heartbeat or at - state.arrived <= timeout_of(state, options):
+    timeout, beat = timeout_of(state, options), state.latest.heartbeat
+    if is_heartbeat or at - state.arrived <= timeout:
         state.arrived = max(at, state.arrived)
+        if beat is not None and speaker.said_at - beat.at > timeout:
+            state.heartbeats = missed(state.heartbeats, at)
     if speaker.lost_since is not None:
         state.stop = estop.lost(state.stop, speaker.lost_since)
+        state.note_loss(speaker.lost_since)
         speaker.lost_since = None
 
 
@@ -101,7 +107,7 @@ def _apply_changes(tracked: TrackedVehicle, now: Instant, options: HardwareOptio
                 speaker.newest.clear()
             for message_id, message, said in change.kept:
                 newest = speaker.newest.get(message_id, -math.inf)
-                if message_id in SAID_ONCE or said.mono > newest:
+                if message_id in SAID_ONCE or said.mono >= newest:
                     speaker.newest[message_id] = max(said.mono, newest)
                     _arrived(tracked, speaker, message, said.mono, options)
                     _use(tracked, speaker, message_id, message, said, options)
@@ -205,11 +211,11 @@ def _settle(speaker: Speaker, state: VehicleState, now: Instant, options: Hardwa
     for moving in (state.motion, state.gps_motion, state.rotation):
         motion.settle(moving, now.mono)
     state.stop = estop.moved(state.stop, state.motion.value, now.mono)
-    moment = Moment(now.mono)
-    facts = facts_of(state, moment, options)
+    deadline = Deadline(now.mono)
+    facts = facts_of(state, deadline, options)
     if facts != speaker.facts:
         speaker.facts = facts
-    return moment.next if _is_connected(speaker) else math.inf
+    return deadline.next if _is_connected(speaker) else math.inf
 
 
 def _is_connected(speaker: Speaker) -> bool:

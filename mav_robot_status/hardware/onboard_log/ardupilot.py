@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 from ...interface import RobotMode, Vehicle
 from ...mavlink.definitions import TYPE_NAMES
 from ...mavlink.enumerations import MAV_TYPE_SURFACE_BOAT
-from ..mavlink import causes
 from ..mavlink.autopilots import ardupilot as tables
 from ..mavlink.autopilots import firmware
+from ..mavlink.faults import causes
 from ..mavlink.identity import FAMILIES, Family
 from .ardupilot_motion import ArduPilotMotion
 from .ardupilot_outputs import Outputs

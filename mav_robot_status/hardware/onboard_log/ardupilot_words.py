@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..mavlink import causes
+from ..mavlink.faults import causes
 
 METHODS: Final = {
     0: "the rudder stick",

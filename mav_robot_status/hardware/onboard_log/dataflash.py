@@ -7,9 +7,8 @@ or slow card has damaged begins like a record, too.
 from __future__ import annotations
 
 from struct import Struct
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ...values import NamedTuple
 from .record import LIFE_US, SIGN_OF_LIFE, Clock, Counts, Record
 
 if TYPE_CHECKING:

@@ -79,7 +79,7 @@ class OnboardLogRobotHW(RobotHW):
         self._robot.booted_at = booted_at
         self.meaning.announced(names)
 
-    def take(self, record: Record, now: Instant, source: Any = None) -> None:
+    def on_frame(self, record: Record, now: Instant, source: Any = None) -> None:
         """One record of the log."""
         last = self._last
         if last is None and self._robot.name not in self.handles.get_names():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from ..mavlink.state import motion
+from ..mavlink.motion import state as motion
 from .state import FALSE, TRUE
 
 if TYPE_CHECKING:
@@ -40,7 +40,10 @@ class Kinematics:
             return True
         state.motion_from = source
         rate = self._rate if now.mono - self._turned_at < FRESH else 0.0
-        return motion.moved(state.motion, speed, rate, state.armed.value is TRUE, self._options, now.mono)
+        seen = state.motion
+        before = seen.speed is None, seen.value, seen.fast_since, seen.slow_since
+        motion.moved(seen, speed, rate, state.armed.value is TRUE, self._options, now.mono)
+        return before == (seen.speed is None, seen.value, seen.fast_since, seen.slow_since)
 
     def proved(self, speed: float, now: Instant) -> bool:
         """A speed that can show motion, and not rest."""

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Final
 
 from ...interface import RobotMode, Vehicle
 from ...mavlink.definitions import TYPE_NAMES
-from ..mavlink import causes
 from ..mavlink.autopilots import firmware
 from ..mavlink.autopilots import px4 as tables
+from ..mavlink.faults import causes
 from ..mavlink.identity import AIRCRAFT, family_of
 from .kinematics import Kinematics
 from .numbers import Values, number, whole

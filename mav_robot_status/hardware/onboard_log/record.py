@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final, Protocol
-
-from ...values import NamedTuple, dataclass
+from dataclasses import dataclass
+from typing import Final, NamedTuple, Protocol
 
 Value = int | float | str | tuple[int | float, ...]
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import ErrorCause, Inhibit, RobotMode, RobotStatus
-from ...values import NamedTuple
-from ..mavlink import causes
-from ..mavlink.state import motion
+from ..mavlink.faults import causes
+from ..mavlink.motion import state as motion
 from .state import FALSE, TRUE, UNKNOWN, Told
 
 if TYPE_CHECKING:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import field
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import Evidence, RobotMode, TriState, Vehicle
-from ...values import NamedTuple, dataclass
-from ..mavlink import causes
-from ..mavlink.state.motion import Motion
+from ..mavlink.faults import causes
+from ..mavlink.motion.state import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -54,6 +53,17 @@ class Mode(NamedTuple):
     at: float = -math.inf
 
 
+NO_ARMED: Final = Told(UNKNOWN, "no record says whether it is armed")
+NO_STOP: Final = Told(UNKNOWN, "no record shows the emergency stop")
+NO_SAFETY: Final = Told(UNKNOWN, "no record of the safety switch")
+NO_LANDED: Final = Told(UNKNOWN, "no record shows whether it is landed")
+NO_REST: Final = Told(UNKNOWN, "no record shows rest")
+NO_OUTPUTS: Final = Told(UNKNOWN, "no record of the motor outputs")
+NO_CHECKS: Final = Told(UNKNOWN, "no record of the arming checks")
+NO_MODE: Final = Mode()
+"""Before a record says it."""
+
+
 @dataclass(slots=True)
 class Active:
     """An error that is active."""
@@ -70,26 +80,26 @@ class Active:
 class LogState:
     """The last words. Each record changes it in place."""
 
-    vehicle: Vehicle = Vehicle()
+    vehicle: Vehicle
     system: int | None = None
     component: int = 1
     family: str = ""
     """`copter`, `plane`, `rover`, `sub`, ...: the name of a family of `hardware.mavlink.identity`."""
     aircraft: bool = False
-    armed: Told = Told(UNKNOWN, "no record says whether it is armed")
-    stop: Told = Told(UNKNOWN, "no record shows the emergency stop")
-    safety: Told = Told(UNKNOWN, "no record of the safety switch")
+    armed: Told = NO_ARMED
+    stop: Told = NO_STOP
+    safety: Told = NO_SAFETY
     """TRUE: it holds the outputs."""
-    landed: Told = Told(UNKNOWN, "no record shows whether it is landed")
-    rests: Told = Told(UNKNOWN, "no record shows rest")
+    landed: Told = NO_LANDED
+    rests: Told = NO_REST
     """Whether the autopilot finds that it is at rest, by its sensors of acceleration."""
-    driven: Told = Told(UNKNOWN, "no record of the motor outputs")
+    driven: Told = NO_OUTPUTS
     outputs_at: float = -math.inf
     """When the motor outputs were last seen."""
     testing: bool = False
     """Whether a motor test runs: between two motors none is driven."""
-    ready: Told = Told(UNKNOWN, "no record of the arming checks")
-    mode: Mode = Mode()
+    ready: Told = NO_CHECKS
+    mode: Mode = NO_MODE
     initialising: bool = False
     hil: bool = False
     terminated: str | None = None

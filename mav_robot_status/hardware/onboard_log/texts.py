@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from ..mavlink import causes
 from ..mavlink.autopilots.texts import COMMON, UNCLASSIFIED, Effect, When, classify
+from ..mavlink.faults import causes
 from .state import FALSE, TRUE, Told
 
 if TYPE_CHECKING:

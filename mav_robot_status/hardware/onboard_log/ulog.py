@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import re
 from struct import Struct
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ...values import NamedTuple
 from .record import LIFE_US, SIGN_OF_LIFE, Clock, Counts, Record
 
 if TYPE_CHECKING:

@@ -52,6 +52,6 @@ def show(source: Source, footer: Callable[[], Sequence[str]] | None = None) -> i
             hint = HINT if utf8 else NO_UTF8
             redraw(source, signs, footer or (lambda: (*[text for text, _ in list(log.lines)[-1:]], hint)))
             return 0
-        from .app import run
+        from .screen import run
 
         return run(source, log, signs)

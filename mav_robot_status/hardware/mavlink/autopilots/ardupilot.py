@@ -14,7 +14,7 @@ from typing import Final
 
 from ....interface.status import RobotMode
 from ....mavlink import enumerations as mavlink
-from .. import causes
+from ..faults import causes
 from ..identity import Family
 from . import sensor_weights, wanted
 from .modes import ModeTable, by_table
@@ -268,7 +268,12 @@ ARDUPILOT: Final = Autopilot(
         overrides_key=None,
         initialising=dict.fromkeys((Family.PLANE, Family.ROVER, Family.TRACKER), INITIALIZING),
     ),
-    states=States(uninit=Uninit.STARTING, standby_is_landed=True, hides_armed=frozenset()),
+    states=States(
+        uninit=Uninit.STARTING,
+        standby_is_landed=True,
+        hides_armed=frozenset(),
+        emergency_is_crash=frozenset({Family.PLANE}),  # GCS_MAVLINK_Plane::vehicle_system_status
+    ),
     texts=Texts(
         rules=TEXTS,
         stop_text=StopText.READINESS,

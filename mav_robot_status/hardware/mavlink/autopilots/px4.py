@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from ....interface.status import RobotMode
 from ....mavlink import enumerations as mavlink
-from .. import causes
+from ..faults import causes
 from . import sensor_weights, wanted
 from .modes import FlightMode, ModeHints, other_name
 from .profile import (
@@ -149,7 +149,9 @@ PX4: Final = Autopilot(
     name="PX4",
     recognition=Recognition(autopilots=frozenset({mavlink.MAV_AUTOPILOT_PX4}), lacks=None),
     modes=Modes(flight_mode=flight_mode, overrides_key="px4", initialising={}),
-    states=States(uninit=Uninit.NOT_READY, standby_is_landed=False, hides_armed=frozenset()),
+    states=States(
+        uninit=Uninit.NOT_READY, standby_is_landed=False, hides_armed=frozenset(), emergency_is_crash=frozenset()
+    ),
     texts=Texts(
         rules=TEXTS,
         stop_text=StopText.STATE,

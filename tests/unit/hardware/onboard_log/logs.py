@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from mav_robot_status.clock import Instant
-from mav_robot_status.gateway.onboard_recording import form_of
+from mav_robot_status.gateway.logs.onboard_recording import form_of
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.onboard_log.interface import OnboardLogRobotHW
 from mav_robot_status.interface import Detail, RobotStatus
@@ -43,7 +43,7 @@ def at(data: bytes, *moments: float, options: HardwareOptions | None = None) -> 
             if now.mono > hw.next_due():
                 hw.read(Instant(hw.next_due(), record.us))
             hw.begun(0.0, reader.names())
-            hw.take(record, now)
+            hw.on_frame(record, now)
         hw.read(Instant(moment, round(moment * 1e6)))
         (handle,) = hw.handles
         why = {name: f"{one.rule} [{one.source}]" for name, one in handle.evidence.items()}

@@ -160,7 +160,7 @@ def _failures(log: _Log) -> Iterator[Found]:
             source = f" ({span.source})" if span.source else ""
             yield "FAULT", f": {found[1]} switched to {span.value} at {log.at(span.start)}{source}{ended}"
     for span in _disarms(log):
-        if _air(log, span) == " in the air" and not LANDED.search(span.rule or ""):
+        if span.rule and _air(log, span) == " in the air" and not LANDED.search(span.rule or ""):
             yield "FAULT", f": disarmed in the air at {log.at(span.start)}{_why(span)}"
     yield from _errors(log, [one for one in log.vehicle.errors if log.has("armed", "TRUE", one.start)])
 

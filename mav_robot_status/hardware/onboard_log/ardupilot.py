@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Final
 
 from ...interface import RobotMode, Vehicle
 from ...mavlink.definitions import TYPE_NAMES
-from ...mavlink.enumerations import MAV_TYPE_SURFACE_BOAT
 from ..mavlink.autopilots import ardupilot as tables
 from ..mavlink.autopilots import firmware
 from ..mavlink.faults import causes
 from ..mavlink.identity import FAMILIES, Family
 from .ardupilot_motion import ArduPilotMotion
 from .ardupilot_outputs import Outputs
-from .ardupilot_words import ANY, METHODS, MOTOR_TESTS, PARTS, REASONS, SUBSYSTEMS, SWITCH_SOURCES
+from .ardupilot_words import ANY, FRAMES, METHODS, MOTOR_TESTS, PARTS, REASONS, SUBSYSTEMS, SWITCH_SOURCES, TYPES
 from .kinematics import Kinematics
 from .numbers import Values, number, whole
 from .state import FALSE, TRUE, UNKNOWN, LogState, Mode, Told
@@ -27,23 +26,14 @@ if TYPE_CHECKING:
     from ..mavlink.options import HardwareOptions
     from .record import Record
 
-FRAMES: Final = {
-    Family.COPTER: {
-        1: 2, 2: 13, 3: 14, 4: 14, 5: 13, 6: 4, 7: 15, 8: 3, 9: 3, 10: 2, 11: 4, 12: 29, 13: 4, 14: 35,
-    },
-    Family.PLANE: {}, Family.ROVER: {2: MAV_TYPE_SURFACE_BOAT}, Family.SUB: {}, Family.TRACKER: {}, Family.BLIMP: {},
-}  # fmt: skip
-"""MAV_TYPE by FRAME_CLASS."""
-TYPES: Final = {
-    Family.COPTER: 2, Family.PLANE: 1, Family.ROVER: 10, Family.SUB: 12, Family.TRACKER: 5, Family.BLIMP: 7,
-}  # fmt: skip
-"""MAV_TYPE without a FRAME_CLASS."""
 AIRBORNE: Final = frozenset({Family.COPTER, Family.PLANE, Family.BLIMP})
 
 AT_BOOT: Final = 30_000_000
 """A log that begins earlier after the start of the autopilot (microseconds) holds every event since."""
 STOPS_FROM: Final = (4, 5)
 """The firmware from which every emergency stop writes an event."""
+LOST_RECORD: Final = 1.0
+"""Seconds after which a periodic record that says armed counts beside the last `ARM`: a motor test, or a lost `ARM`."""
 ESTOP_FUNCTIONS: Final = frozenset({31, 165})
 """Functions of a switch: the motor emergency stop, and arm or emergency stop."""
 ARM_COMMAND, AUX_COMMAND, ACCEPTED = 400, 218, 0
@@ -166,7 +156,8 @@ class ArduPilotMeaning:
         """A log that begins at the start of the autopilot, and not by arming, begins disarmed."""
         if self.state.armed.source not in (None, "PARM"):
             return
-        begins = self._begun_at_boot and self._settings.get("LOG_DISARMED", 0) > 0
+        tells = not self._names.isdisjoint(("ARM", "EV"))
+        begins = tells and self._begun_at_boot and self._settings.get("LOG_DISARMED", 0) > 0
         value = FALSE if begins and self._settings.get("ARMING_REQUIRE", 1) > 0 else UNKNOWN
         rule = "not armed since the autopilot has started" if value is FALSE else "no record says whether it is armed"
         self.state.armed = Told(value, rule, "PARM", now.mono)
@@ -179,7 +170,7 @@ class ArduPilotMeaning:
         by = "" if method < 0 else f" by {METHODS.get(method, f'method {method}')}"
         rule = f"{'armed' if armed else 'disarmed'}{by}{', forced' if forced else ''}"
         self.state.set_armed(Told(TRUE if armed else FALSE, rule, source, now.mono))
-        if armed and not forced and whole(values, "ArmChecks") > 0 and self.state.stop.value is UNKNOWN:
+        if armed and not forced and whole(values, "ArmChecks") > 0 and self.state.stop.value is not FALSE:
             self._checked(now)
         return False
 
@@ -264,6 +255,8 @@ class ArduPilotMeaning:
         if state.armed.value is UNKNOWN and (armed == 1 or (armed == 0 and state.safety.value is not TRUE)):
             state.set_armed(Told(TRUE if armed else FALSE, "armed" if armed else "disarmed", "STAT.Armed", now.mono))
             unchanged = False
+        live = armed == 1 and now.mono > state.armed.at + LOST_RECORD
+        unchanged, state.live = unchanged and live is state.live, live
         landed = FALSE if flies == 1 else TRUE
         if flies >= 0 and landed is not state.landed.value:
             state.landed = Told(landed, "it flies" if flies else "it does not fly", "STAT.isFlying", now.mono)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from ...mavlink.enumerations import MAV_TYPE_SURFACE_BOAT
 from ..mavlink.faults import causes
+from ..mavlink.identity import Family
 
 METHODS: Final = {
     0: "the rudder stick",
@@ -148,3 +150,14 @@ PARTS: Final = {3: "ompass", 11: "GPS", 18: "aro"}
 """ERR.Subsys of a part that texts against arming name."""
 MOTOR_TESTS: Final = {"starting motor test": True, "finished motor test": False}
 """MSG of a Copter at the begin and at the end of a motor test."""
+FRAMES: Final = {
+    Family.COPTER: {
+        1: 2, 2: 13, 3: 14, 4: 14, 5: 13, 6: 4, 7: 15, 8: 3, 9: 3, 10: 2, 11: 4, 12: 29, 13: 4, 14: 35,
+    },
+    Family.PLANE: {}, Family.ROVER: {2: MAV_TYPE_SURFACE_BOAT}, Family.SUB: {}, Family.TRACKER: {}, Family.BLIMP: {},
+}  # fmt: skip
+"""MAV_TYPE by FRAME_CLASS."""
+TYPES: Final = {
+    Family.COPTER: 2, Family.PLANE: 1, Family.ROVER: 10, Family.SUB: 12, Family.TRACKER: 5, Family.BLIMP: 7,
+}  # fmt: skip
+"""MAV_TYPE without a FRAME_CLASS."""

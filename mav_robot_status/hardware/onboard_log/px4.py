@@ -32,6 +32,8 @@ NAV_STATES: Final = {
     14: (6, 0), 15: (7, 0), 16: (8, 0), 17: (4, 2), 18: (4, 6), 19: (4, 8), 20: (4, 9), 21: (3, 1), 22: (4, 10),
 }  # fmt: skip
 """The main and the sub mode of vehicle_status.nav_state."""
+ARMED: Final = 2
+"""vehicle_status.arming_state, of all versions."""
 EXTERNAL: Final = range(23, 31)
 """The nav_state of modes of other programs."""
 STOPS: Final = {
@@ -168,8 +170,9 @@ class Px4Meaning:
     def status(self, values: Values, now: Instant) -> bool:
         """vehicle_status."""
         state = self.state
-        if "actuator_armed" not in self._names:
-            self._set_armed(whole(values, "arming_state") == 2, "vehicle_status.arming_state", now)
+        is_armed, is_late = whole(values, "arming_state") == ARMED, now.mono > state.armed.at + TOGETHER
+        if "actuator_armed" not in self._names or (is_armed and is_late and state.armed.value is FALSE):
+            self._set_armed(is_armed, "vehicle_status.arming_state", now)
         before = (state.mode, state.armed, state.ready, state.safety, state.vehicle, state.hil, set(state.active))
         state.hil = whole(values, "hil_state") == 1
         self._mode(whole(values, "nav_state"), now)

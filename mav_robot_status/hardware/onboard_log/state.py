@@ -96,6 +96,8 @@ class LogState:
     driven: Told = NO_OUTPUTS
     outputs_at: float = -math.inf
     """When the motor outputs were last seen."""
+    live: bool = False
+    """Whether a periodic record says armed although the last event says disarmed."""
     testing: bool = False
     """Whether a motor test runs: between two motors none is driven."""
     ready: Told = NO_CHECKS
@@ -191,7 +193,7 @@ class LogState:
         if self.safety.value is TRUE:
             self.safety = Told(UNKNOWN, gone)
         self.landed, self.rests, self.driven = (Told(UNKNOWN, gone),) * 3
-        self.motion, self.testing = Motion(), False
+        self.motion, self.testing, self.live = Motion(), False, False
 
 
 def _holds(text: str) -> float:

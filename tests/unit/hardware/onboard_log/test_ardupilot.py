@@ -86,6 +86,22 @@ def test_the_safety_switch_holds_the_outputs() -> None:
     assert said.inhibits == {"SAFETY_SWITCH"}
 
 
+def test_a_plane_whose_arming_is_not_in_the_log_is_armed_by_its_status() -> None:
+    status = [(3 + n / 5, "STAT", 0, 1, 2, 0) for n in range(20)]
+    assert at(log(*status, banner="ArduPlane V4.5.6"), 6)[0].status.drives_powered is TRUE
+
+
+def test_an_arming_with_checks_ends_a_stop_whose_release_is_not_in_the_log() -> None:
+    before, after = at(log((3, "EV", 54), (6, "ARM", 1, 1, 0, 1)), 5, 7)
+    assert (before.status.e_stopped, after.status.e_stopped) == (TRUE, FALSE)
+
+
+def test_a_log_without_records_of_arming_does_not_begin_disarmed() -> None:
+    records = [(1.0, "MSG", ROVER), (1.0, "PARM", "LOG_DISARMED", 1.0, 0.0)]
+    records += [(1 + n / 2, "POWR", 2) for n in range(10)]
+    assert at(dataflash(*records, names=("MSG", "PARM", "POWR")), 4)[0].status.drives_powered is UNKNOWN
+
+
 def test_modes_with_their_reason() -> None:
     (said,) = at(log((4, "MODE", 11, 11, 3)), 5)
     assert (said.status.mode, said.detail.vehicle.flight_mode) == (RobotMode.AUTO, "RTL")

@@ -62,7 +62,7 @@ def form_of(name: str, length: int, types: str, columns: str, wanted: Mapping[st
     if layout is not None and (layout.size + HEAD_SIZE != length or len(names) != len(types)):
         layout = None
     unit = TIMES.get((names[0], types[0]), 0) if names and types else 0
-    numbered = bool(unit) and len(names) > 1 and names[1] in INSTANCES and types[1] == "B"
+    numbered = bool(unit) and len(names) > 1 and names[1] in INSTANCES and types[1:2] == "B"
     every = round(wanted.get(name, 0.0) * 1e6)
     time = Struct("<" + CODES[types[0]]) if unit else None
     return Form(name, length, layout, types, names, time, unit, numbered, name in wanted, every)

@@ -72,7 +72,7 @@ def e_stopped(state: LogState, options: HardwareOptions) -> Told:
 def _is_driven(state: LogState) -> bool:
     """Whether a motor is driven; after a stop of an armed robot only if it is for longer than motors need to stop."""
     if state.driven.value is not TRUE:
-        return state.live and state.armed.value is FALSE
+        return state.live and state.armed.value is FALSE and state.stop.value is not TRUE
     is_test = state.testing or (state.armed.value is FALSE and state.armed.at < state.stop.at)
     return state.stop.value is not TRUE or is_test or state.outputs_at >= state.stop.at + SPOOL
 
@@ -85,10 +85,12 @@ def drives_powered(state: LogState, stop: Told, options: HardwareOptions) -> Tol
         by_outputs = state.driven.value is TRUE
         found = state.driven if by_outputs else Told(TRUE, "its status says armed", "STAT.Armed", state.outputs_at)
         return found._replace(rule=f"{state.armed.rule}, but {found.rule}")
-    if state.armed.value is not TRUE:
+    if state.armed.value is FALSE:
         return state.armed
     if stop.value is TRUE:
         return stop._replace(value=FALSE)
+    if state.armed.value is UNKNOWN:
+        return state.armed
     if state.safety.value is TRUE:
         return state.safety._replace(value=FALSE)
     return state.armed

@@ -77,6 +77,11 @@ def test_an_unknown_type_of_value_is_skipped_by_its_length() -> None:
     assert len(read(DataFlashReader(EVERY), formats() + strange + record("EV", 5, 10))) == 1
 
 
+def test_a_definition_with_fewer_types_than_columns_is_skipped() -> None:
+    strange = record("FMT", 99, 11, "ODD", "Q", "TimeUS,I") + b"\xa3\x95" + bytes([99]) + bytes(8)
+    assert len(read(DataFlashReader(EVERY), formats() + strange + record("EV", 5, 10))) == 1
+
+
 def test_only_the_first_sensor_is_read() -> None:
     data = dataflash(*((1 + n / 5, "GPS", n % 2, 6, 0, 2446, 1.0, 0.0) for n in range(10)))
     assert {one.values["I"] for one in read(DataFlashReader(EVERY), data)} == {0}

@@ -24,7 +24,7 @@ from ..hardware.mavlink.senders import Sender, senders
 from ..interface import HardwareInterface, IndustrialRobotStatusHandle, LinkState
 from ..interface.explanation import explanation
 from ..json_object import JsonObject
-from ..language import remedy
+from ..language import remedy, same_step
 from ..links.log import Stamped
 from ..streams import NO_OUTPUT
 from .vehicle_reports import PAGE, WORDS, applet_reports, arming_checks
@@ -180,6 +180,7 @@ def _table(one: JsonObject) -> Iterator[str]:
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
     for row in rows:
         yield "  ".join((row[0].ljust(widths[0]), row[1].ljust(widths[1]), row[2].rjust(widths[2]), row[3]))
+    yield from _unknown(one)
     for sender in one.get("senders", ()):
         yield f"sender   {Sender(**sender).words}"
     if "applet" in one:
@@ -187,6 +188,13 @@ def _table(one: JsonObject) -> Iterator[str]:
     yield from _causes(one)
     for check in one.get("arming_checks", ()):
         yield f"check    {_checked(check)}"
+
+
+def _unknown(one: JsonObject) -> Iterator[str]:
+    """What would make the UNKNOWN fields known. Fields that need the same share a line."""
+    steps = {name: field["next"] for name, field in one["fields"].items() if field["next"] is not None}
+    for step, names in same_step(steps).items():
+        yield f"{'unknown':<9}{', '.join(names)}: {step}"
 
 
 def _causes(one: JsonObject) -> Iterator[str]:

@@ -6,6 +6,7 @@ a broker or a log has the same words as a live one.
 
 from .headline import Headline, Sentence, headline
 from .remedies import Remedy, remedy, spoken
+from .unknown import next_step, same_step
 from .values import LINK, LOOKS, TONES, Look, Tone, look, style_sheet
 
 __all__ = [
@@ -19,7 +20,9 @@ __all__ = [
     "Tone",
     "headline",
     "look",
+    "next_step",
     "remedy",
+    "same_step",
     "spoken",
     "style_sheet",
 ]

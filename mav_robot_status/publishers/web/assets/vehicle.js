@@ -154,8 +154,13 @@ function linkTile(robot) {
   return make("div", {}, make("dt", {}, LINK.title), make("dd", {}, chip(look), make("small", { id: "link-age" })));
 }
 
+/** The rule that decided, and below it what would make an unknown field known. */
+function rule(found) {
+  return found.next ? make("div", {}, isolated(found.rule ?? "–"), make("small", {}, found.next)) : isolated(found.rule ?? "–");
+}
+
 function reason(field, found) {
-  const cells = [chip(looks(field, found.value)), isolated(found.rule ?? "–"), isolated(found.source ?? "–"), typeof found.age === "number" ? `${found.age.toFixed(1)} s` : "–"];
+  const cells = [chip(looks(field, found.value)), rule(found), isolated(found.source ?? "–"), typeof found.age === "number" ? `${found.age.toFixed(1)} s` : "–"];
   const head = make("th", { role: "rowheader", scope: "row" }, field.title);
   return make("tr", { role: "row" }, head, ...cells.map((cell, n) => make("td", { role: "cell", "data-head": WHY[n + 1] }, cell)));
 }

@@ -260,11 +260,6 @@ def test_every_source_that_the_semantics_cite_is_listed() -> None:
         assert sorted(cited - listed) == [], name_of(page)
 
 
-def test_every_sequence_of_the_semantics_has_a_test_and_every_test_a_sequence() -> None:
-    tests = (ROOT / "tests" / "unit" / "hardware" / "mavlink" / "test_sequences.py").read_text()
-    assert re.findall(r'"""(Q\d\d)', tests) == [row[0] for row in table("docs/semantics/sequences.md", "#")]
-
-
 def test_every_anchor_of_a_link_is_a_heading() -> None:
     for document in DOCUMENTS:
         for link in links(document):

@@ -38,8 +38,9 @@ def render(result: dict[str, Any], before: dict[str, Any] | None = None) -> str:
 
 
 def summary(result: dict[str, Any]) -> str:
-    """The machine, and the table of targets."""
-    return f"{_head(result)}\n\n{_targets(result, None)}\n"
+    """The machine, and the table of those targets that were measured."""
+    cases = [{**case, "targets": [t for t in case["targets"] if t["value"] is not None]} for case in result["cases"]]
+    return f"{_head(result)}\n\n{_targets({**result, 'cases': cases}, None)}\n"
 
 
 def _head(result: dict[str, Any]) -> str:

@@ -85,6 +85,13 @@ LAST: Final = "Last known"
 MAY_MOVE: Final = Sentence("It may be moving")
 MOTION_UNKNOWN: Final = Sentence("Whether it moves is unknown")
 PART: Final = Sentence("Another member may move: look at each")
+"""For a group whose line does not say which members are ready."""
+OF_A_MEMBER: Final = {
+    "E_STOPPED": "is stopped",
+    UNHEARD: "is not heard and may move",
+    "MOTION_UNKNOWN": "may be able to move",
+}
+"""What a member does that is not ready, by the reason."""
 
 
 def headline(line: Line, last: Line | None = None) -> Headline:
@@ -97,7 +104,7 @@ def headline(line: Line, last: Line | None = None) -> Headline:
     sentences = (
         *_why(line, state),
         *map(_sentence, _list(line, "errors")),
-        *map(_quoted, _unheard_members(line)),
+        *(() if _members(line) else map(_quoted, _unheard_members(line))),
         *(() if state == "unknown" or isinstance(line.get("in_motion"), bool) else (MOTION_UNKNOWN,)),
         *_charge(line, state),
     )
@@ -105,7 +112,7 @@ def headline(line: Line, last: Line | None = None) -> Headline:
     tone, rank = row.tone, row.rank
     if line.get("in_error") is True:
         tone, rank = "alarm", min(rank, IN_ERROR)
-    if line.get("e_stopped") is True:  # it may still move
+    if line.get("e_stopped") is True or _stopped_members(line):  # it, or another member, may still move
         tone, rank = "alarm", ROWS["stopped"].rank
     elif tone == "calm" and needy is not None:
         tone, rank = "warning", NEEDS_A_LOOK
@@ -128,8 +135,10 @@ def _state(line: Line) -> str:
     is_group = bool(line.get("members"))
     if line.get("in_motion") is True:
         return "moving"
-    if line.get("e_stopped") is True:
-        return "partly stopped" if is_group else "stopped"
+    if line.get("e_stopped") is True and (not is_group or _whole_is_stopped(line)):
+        return "stopped"
+    if is_group and line.get("motion_possible") is not True and (line.get("e_stopped") or _stopped_members(line)):
+        return "partly stopped"
     if line.get("motion_possible") is True:
         return "can move"
     if line.get("motion_possible") is False:
@@ -174,14 +183,14 @@ def heard_at(line: Line) -> str | None:
 
 def _why(line: Line, state: str) -> tuple[Sentence, ...]:
     """Why it cannot move, or what is not known."""
-    if state == "partly stopped":
-        stopped = dict.fromkeys(str(one["handle"]) for one in _inhibits(line) if _is_stop(one))
-        who = f"Emergency stop engaged: {', '.join(stopped)}" if stopped else "A member has its emergency stop engaged"
-        return (Sentence(who), PART)
     if state == "unknown":
-        return (Sentence("Whether it can move is unknown"), MAY_MOVE, *map(_quoted, _inhibits(line)))
+        return (
+            Sentence("Whether it can move is unknown"),
+            *(_members(line) or (MAY_MOVE,)),
+            *map(_quoted, _inhibits(line)),
+        )
     if line.get("motion_possible") is not False:
-        return ()
+        return _members(line) or ((PART,) if state == "partly stopped" else ())
     found = _inhibits(line)
     if not found:
         return () if state == "moving" else (Sentence("Cannot move"),)
@@ -190,8 +199,43 @@ def _why(line: Line, state: str) -> tuple[Sentence, ...]:
     return (
         Sentence(f"{says}: {', '.join(names)}"),
         *map(_quoted, (one for one in found if one.get("text"))),
-        *((PART,) if line.get("members") else ()),
+        *_others(line),
     )
+
+
+def _others(line: Line) -> tuple[Sentence, ...]:
+    """The members of a group that cannot move as a whole: another rule than ours may say so while one of them can."""
+    names, told = line.get("members"), _list(line, "not_ready")
+    if not names or (told and isinstance(names, list) and len(told) >= len(names)):
+        return ()
+    return _members(line) or (PART,)
+
+
+def _members(line: Line) -> tuple[Sentence, ...]:
+    """Each member of a group in which one is not ready: `base is stopped; arm is ready and may move`."""
+    not_ready = {str(one.get("handle")): one.get("why") for one in _list(line, "not_ready")}
+    names = line.get("members")
+    if not not_ready or not isinstance(names, list):
+        return ()
+    words = (f"{name} {_of_a_member(name, not_ready)}" for name in map(str, names))
+    return (Sentence("; ".join(words)),)
+
+
+def _of_a_member(name: str, not_ready: Mapping[str, object]) -> str:
+    if name not in not_ready:
+        return "is ready and may move"
+    why = not_ready[name]
+    return OF_A_MEMBER.get(str(why)) or f"is not ready: {remedy({'name': why}).sentence}"
+
+
+def _stopped_members(line: Line) -> list[str]:
+    """The members of a group whose emergency stop is engaged."""
+    return [str(one.get("handle")) for one in _list(line, "not_ready") if one.get("why") == "E_STOPPED"]
+
+
+def _whole_is_stopped(line: Line) -> bool:
+    names = line.get("members")
+    return isinstance(names, list) and set(map(str, names)) == set(_stopped_members(line))
 
 
 def _quoted(cause: JsonMapping) -> Sentence:
@@ -208,10 +252,6 @@ def _sentence(error: JsonMapping) -> Sentence:
     """An error, with the words of the autopilot."""
     text = error.get("text")
     return Sentence(f"Error: {_member(error)}{remedy(error).sentence}", None, str(text) if text else None)
-
-
-def _is_stop(cause: JsonMapping) -> bool:
-    return cause.get("name") == "E_STOPPED" and bool(cause.get("handle"))
 
 
 def _member(cause: JsonMapping) -> str:

@@ -78,9 +78,39 @@ def test_a_lost_member_is_no_reason_why_a_group_cannot_move() -> None:
 
 
 def test_a_group_that_is_stopped_in_part_names_the_members_that_are() -> None:
+    group = {**LIVE, "members": ["base", "arm"], "e_stopped": None, "ready": False}
+    found = headline(line(**group, not_ready=[{"handle": "base", "why": "E_STOPPED"}]))
+    assert (found.word, found.tone, found.rank) == ("CAN MOVE", "alarm", 0)
+    assert spoken(found).startswith("base is stopped; arm is ready and may move.")
+    lost = {"handle": "arm", "why": "LINK_STALE"}
+    both = headline(
+        line(**{**group, "motion_possible": None}, not_ready=[{"handle": "base", "why": "E_STOPPED"}, lost])
+    )
+    assert both.word == "STOPPED IN PART"
+    assert spoken(both) == "base is stopped; arm is not heard and may move."
+
+
+def test_a_group_is_stopped_if_every_member_is() -> None:
+    not_ready = [{"handle": name, "why": "E_STOPPED"} for name in ("base", "arm")]
+    found = headline(line(members=["base", "arm"], e_stopped=True, ready=False, not_ready=not_ready))
+    assert (found.word, spoken(found)) == ("EMERGENCY STOP", "Cannot move: disarmed.")
+
+
+def test_a_group_of_an_older_gateway_does_not_say_which_member_may_move() -> None:
     stop = {"name": "E_STOPPED", "text": None, "since": STAMP, "handle": "arm"}
     found = headline(line(members=["base", "arm"], e_stopped=True, inhibits=[stop]))
-    assert spoken(found) == "Emergency stop engaged: arm. Another member may move: look at each."
+    assert found.word == "STOPPED IN PART"
+    assert spoken(found).endswith("Another member may move: look at each.")
+
+
+def test_each_member_that_is_not_ready_is_named_with_its_reason() -> None:
+    reasons = ("DISARMED", "MOTION_UNKNOWN", "BATTERY_LOW", "LINK_STALE")
+    not_ready = [{"handle": name, "why": why} for name, why in zip("abcd", reasons, strict=True)]
+    found = headline(line(**LIVE, members=list("abcde"), ready=False, not_ready=not_ready))
+    assert spoken(found).startswith(
+        "a is not ready: disarmed; b may be able to move; c is not ready: the battery is low; "
+        "d is not heard and may move; e is ready and may move."
+    )
 
 
 def test_of_a_moving_robot_nothing_says_that_it_cannot_move() -> None:
@@ -108,6 +138,10 @@ def test_without_a_link_no_word_says_that_it_is_safe() -> None:
 
 def test_any_members_of_a_line_have_a_headline() -> None:
     odd: tuple[Any, ...] = (None, True, 3, "x", [], [3], {}, {"state": 7})
+    group = {"members": ["a", "b"], "ready": False, "not_ready": [{"handle": "a", "why": "E_STOPPED"}]}
+    for name, value in product(group, (*odd, [{"handle": ["a"], "why": ["x"]}], [{}])):
+        assert headline(line(**group) | {name: value}).word, (name, value)
+        assert headline(line(**LIVE, **group) | {name: value}).word, (name, value)
     for name, value in product(line(), odd):
         assert headline(line(**{name: value})).word, (name, value)
         assert headline(line(**LOST) | {name: value}, line(**{name: value})).word, (name, value)

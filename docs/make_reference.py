@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import pathlib
 import sys
@@ -20,7 +21,6 @@ from mav_robot_status.hardware.mavlink.autopilots.texts import TextRule, When
 from mav_robot_status.hardware.mavlink.autopilots.wanted import Wanted
 from mav_robot_status.hardware.mavlink.faults import causes, sensors
 from mav_robot_status.hardware.mavlink.identity import sensor_name
-from mav_robot_status.hardware.mavlink.readiness.rule import INHIBITS
 from mav_robot_status.hardware.mavlink.requests.message_intervals import wanted_of
 from mav_robot_status.interface import RobotMode
 from mav_robot_status.interface.options import Declared
@@ -94,10 +94,9 @@ def codes() -> Iterator[str]:
     yield "## Error codes\n"
     yield "If several causes are active, error_code is the first of this table. `errors` has all of them.\n"
     ordered = sorted(causes.CAUSES.items(), key=lambda item: item[1].priority)
-    yield from table(
-        ("code", "name", "ends with"),
-        ((code, cause.name, _ending(cause)) for code, cause in ordered if code // 1000 != 3),
-    )
+    others = [(f"{code} {cause.name}", _ending(cause)) for code, cause in ordered if code // 1000 != 3]
+    alike = itertools.groupby(others, key=lambda row: row[1])
+    yield from table(("codes", "end with"), ((", ".join(name for name, _ in of), end) for end, of in alike))
     yield "3000 + n is bit n of SYS_STATUS, 3100 + n bit n of its extended word; they come after the codes above up to"
     yield "9001, and before 6000 and 7000.\n"
 
@@ -140,12 +139,6 @@ def _effect(rule: TextRule) -> str:
     return f"{rule.effect.value.removesuffix(CAUSES)} {named}{when}".strip()
 
 
-def reasons() -> Iterator[str]:
-    yield "## Inhibits\n"
-    yield "Why motion is not possible; the bit is that of ROBOT_STATUS.inhibit_flags.\n"
-    yield from table(("bit", "name"), enumerate(INHIBITS))
-
-
 def outputs() -> Iterator[str]:
     yield "## Options of the publishers\n"
     yield "In a configuration: `{type: NAME, OPTION: VALUE}`. The command line has the arguments of the last column."
@@ -180,7 +173,10 @@ def requested() -> Iterator[str]:
     yield from table(
         ("vehicles", "messages, Hz"),
         (
-            ("; ".join(_families(*kind) for kind in kinds.items()), ", ".join(f"{w.name} {w.rate:g}" for w in wanted) or "none")
+            (
+                "; ".join(_families(*kind) for kind in kinds.items()),
+                ", ".join(f"{w.name} {w.rate:g}" for w in wanted) or "none",
+            )
             for wanted, kinds in sets.items()
         ),
     )
@@ -193,7 +189,7 @@ def _families(autopilot: str, families: list[str]) -> str:
 
 def page() -> str:
     """The whole page."""
-    parts = (modes(), codes(), reasons(), bits(), texts(), requested(), outputs())
+    parts = (modes(), codes(), bits(), texts(), requested(), outputs())
     return HEAD + "\n" + "\n".join(line for part in parts for line in part).rstrip() + "\n"
 
 

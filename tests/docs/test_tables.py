@@ -232,7 +232,9 @@ def test_an_index_lists_every_page_of_its_folder(folder: str) -> None:
 
 def test_the_picture_of_the_architecture_shows_every_room_and_no_other() -> None:
     package = ROOT / "mav_robot_status"
-    picture = next(b for b in blocks("text") if b.document.name == "architecture.md" and b.code.startswith(package.name))
+    picture = next(
+        b for b in blocks("text") if b.document.name == "architecture.md" and b.code.startswith(package.name)
+    )
     path = [package]
     drawn = set()
     for line in picture.code.splitlines()[1:]:
@@ -249,7 +251,9 @@ def test_the_picture_of_the_architecture_shows_every_room_and_no_other() -> None
 def test_the_rooms_are_drawn_in_the_order_of_their_imports() -> None:
     text = (ROOT / "pyproject.toml").read_text()
     layers = text.partition("layers = [")[2].partition("]")[0]
-    order = [name for name in re.findall(r"mav_robot_status\.(\w+)", layers) if (ROOT / "mav_robot_status" / name).is_dir()]
+    order = [
+        name for name in re.findall(r"mav_robot_status\.(\w+)", layers) if (ROOT / "mav_robot_status" / name).is_dir()
+    ]
     picture = next(b for b in blocks("text") if b.code.startswith("mav_robot_status/"))
     assert re.findall(r"^[├└]── (\w+)/", picture.code, re.MULTILINE) == [*order, "data"]
 

@@ -184,3 +184,5 @@ class RobotStatusMsg(NamedTuple):
     detail: Detail
     heartbeat_age: float | None
     """Seconds since the robot's controller was last heard; None if never."""
+    boot_s: float | None = None
+    """Seconds since the robot's controller has started; None unless its own log is replayed."""

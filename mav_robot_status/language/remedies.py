@@ -85,6 +85,9 @@ INHIBIT_ROWS: Final[dict[str, Remedy]] = {
         "Look for a radio or a program that stores frames. The command doctor says how late they are.",
         "link",
     ),
+    "LOG_GAP": Remedy(
+        "the log does not tell", "Look at what the log holds. The command doctor says what it lacks.", "link"
+    ),
     "MOTION_NOT_POSSIBLE": Remedy("the robot does not say why", "Look at its own display.", "robot-arm"),
 }
 """The inhibits of a vehicle and of a group."""

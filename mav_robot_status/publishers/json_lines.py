@@ -45,7 +45,8 @@ def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
 def native(msg: RobotStatusMsg, seq: int, body: str) -> str:
     """The native line."""
     age = "null" if msg.heartbeat_age is None else f"{max(0.0, msg.heartbeat_age):.3f}"
-    return f'{{"stamp": "{rfc3339(msg.unix_us)}", "seq": {seq}, {body}, "heartbeat_age": {age}}}}}\n'
+    boot = "" if msg.boot_s is None else f'"boot_s": {msg.boot_s:.3f}, '
+    return f'{{"stamp": "{rfc3339(msg.unix_us)}", {boot}"seq": {seq}, {body}, "heartbeat_age": {age}}}}}\n'
 
 
 def ros1(msg: RobotStatusMsg, seq: int) -> str:

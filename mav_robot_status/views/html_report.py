@@ -25,6 +25,7 @@ from ..language import LOOKS, remedy, style_sheet
 from ..language.values import NO, UNKNOWN, YES
 from .timeline import TRACKS, Reason, Span, Timeline, VehicleTimeline
 from .totals import ReasonTotal, Totals, totals
+from .verdict import verdict
 
 WORDS: Final = {"TRUE": True, "FALSE": False, "UNKNOWN": None}
 """The JSON of a TriState."""
@@ -37,7 +38,9 @@ VALUES: Final[dict[str, tuple[str, ...]]] = {
 """The values of each track. The totals list all of them, even those that never occurred."""
 LOOKS_OF: Final = {**LOOKS, "armed": {True: YES, False: NO, None: UNKNOWN}}
 """The looks of each track. A flight mode has its own name."""
-UNCERTAIN: Final = ("LINK_STALE", "SYS_STATUS_MISSING", "STOP_UNCERTAIN", "SENDER_UNCERTAIN", "HEARTBEAT_LATE")
+UNCERTAIN: Final = (
+    "LINK_STALE", "SYS_STATUS_MISSING", "STOP_UNCERTAIN", "SENDER_UNCERTAIN", "HEARTBEAT_LATE", "LOG_GAP"
+)  # fmt: skip
 """The inhibits that say why something is unknown, not why motion is not possible."""
 NOT_READY: Final = "not ready: "
 """Before the member and its reason, on the page."""
@@ -67,6 +70,7 @@ def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> JsonObject:
             **({} if vehicle.name is None else {"name": vehicle.name}),
         },
         **({"members": list(vehicle.members)} if vehicle.members else {}),
+        "verdict": verdict(timeline, vehicle).members(),
         "totals": {
             "seconds": _seconds(whole.watched),
             "arm_cycles": len(whole.arm_cycles),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
+from ..extras import install
 from ..publishers.mqtt.options import BrokerOptions
 from ..publishers.web.options import DEFAULT_LISTEN, HttpOptions
 from .options import given, publisher, verbosity
@@ -34,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("mav_robot_status"):
             raise
-        raise UsageError("the board needs extras: pip install 'mav-robot-status[mqtt,web]'") from None
+        raise UsageError(f"the board needs extras: {install('mqtt', 'web')}") from None
     fleet = FleetBoard(source, page)
     fleet.stop_on_signals()
     fleet.run()

@@ -64,6 +64,8 @@ class Endpoint:
         """The addresses that got no channel since the last line in the log, as far as they are counted."""
         self._unanswered: set[Address] = set()
         """The same for those that got no place among the peers."""
+        self._not_heard = 0
+        """How many they were before that line."""
         self._tell_left_out, self._tell_unanswered = PacedLog(log), PacedLog(log)
         self._scratch = Parser(self._wanted)
         """Parses the first bytes of an address. Only a valid frame gives it a channel."""
@@ -236,12 +238,19 @@ class Endpoint:
             (self._left_out, self._tell_left_out, "not heard", MOST_SOURCES),
             (self._unanswered, self._tell_unanswered, "neither answered nor forwarded", MOST_PEERS),
         ):
+            if now >= tell.due and addresses is self._left_out:
+                self._not_heard = len(addresses)
             if addresses and now >= tell.due:
                 number = f"{len(addresses)} sender{'s are' if len(addresses) > 1 else ' is'} {what}"
                 room = f"there is room for {most}, and for {most // SHARE} at one address"
                 line = f"{self.link.text}: {number}, {_where(next(iter(addresses)))} for one: {room}"
                 tell(logging.WARNING, now, line)
                 addresses.clear()
+
+    @property
+    def left_out(self) -> int:
+        """How many senders have no channel, because there are too many, lately."""
+        return max(len(self._left_out), self._not_heard)
 
     def totals(self) -> Counters:
         """The counters of all channels, added up."""
@@ -270,7 +279,7 @@ class Endpoint:
         got = self.totals()
         log.info(
             "%s: %d frames, %d lost, %d with a bad CRC, %d with an unknown id, %d bytes of garbage, "
-            "%d datagrams dropped; sent %d bytes unasked, %d messages held back",
+            "%d datagrams dropped; sent %s, %s",
             self.link.text,
             got.frames,
             got.lost,
@@ -278,8 +287,8 @@ class Endpoint:
             sum(got.unknown.values()),
             got.garbage_bytes,
             self.link.dropped,
-            self.speech.said,
-            self.speech.withheld,
+            _kilobytes(self.speech.said),
+            f"{self.speech.withheld} messages had to wait" if self.speech.withheld else "no message had to wait",
         )
 
 
@@ -288,6 +297,10 @@ def _renewed(parser: Parser, wanted: frozenset[int] | None) -> Parser:
     new = Parser(wanted)
     new.counters.add(parser.counters)
     return new
+
+
+def _kilobytes(number: int) -> str:
+    return f"{number} bytes" if number < 1000 else f"{number / 1000:.0f} kB"
 
 
 def _where(source: Address) -> str:

@@ -48,6 +48,7 @@ def _connection(endpoint: Endpoint) -> ConnectionMetrics:
         endpoint.link.dropped,
         endpoint.speech.said,
         endpoint.speech.withheld,
+        endpoint.left_out,
     )
 
 

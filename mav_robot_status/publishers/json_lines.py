@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg, Vehicle
+    from ..json_object import JsonObject
 
 WORDS: Final[dict[Kind, Mapping[int, str]]] = {
     Kind.MODE: {mode: f'"{mode.name}"' for mode in RobotMode},
@@ -65,6 +66,12 @@ def _vehicle(vehicle: Vehicle) -> str:
 @lru_cache(maxsize=256)
 def _group(members: tuple[str, ...]) -> str:
     return f'"members": {json.dumps(members)}, ' if members else ""
+
+
+def line_of(handle: str, status: RobotStatus, detail: Detail) -> JsonObject:
+    """The members of the native line, without those that change in each one: stamp, seq and heartbeat_age."""
+    found: JsonObject = json.loads("{" + native_body(handle, status, detail) + "}}")
+    return found
 
 
 def native(msg: RobotStatusMsg, seq: int, body: str) -> str:

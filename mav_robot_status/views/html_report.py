@@ -20,12 +20,16 @@ from ..clock import rfc3339
 from ..errors import LinkError, UsageError
 from ..interface import STATES, Kind, LinkState, RobotMode
 from ..language import LOOKS, remedy, style_sheet
+from ..language.shapes import drawing
+from ..language.states import UNSURE
 from ..language.values import NO, UNKNOWN, YES
+from ..streams import visible
 from .timeline import TRACKS, Span
 from .totals import totals
+from .verdict import verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from ..json_object import JsonObject
     from .timeline import Reason, Timeline, VehicleTimeline
@@ -42,8 +46,6 @@ VALUES: Final[dict[str, tuple[str, ...]]] = {
 """The values of each track. The totals list all of them, even those that never occurred."""
 LOOKS_OF: Final = {**LOOKS, "armed": {True: YES, False: NO, None: UNKNOWN}}
 """The looks of each track. A flight mode has its own name."""
-UNCERTAIN: Final = ("LINK_STALE", "SYS_STATUS_MISSING", "STOP_UNCERTAIN", "SENDER_UNCERTAIN", "HEARTBEAT_LATE")
-"""The inhibits that say why something is unknown, not why motion is not possible."""
 ESCAPES: Final = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&"})
 """Characters that could open or close an element; in JSON they occur in strings only."""
 
@@ -70,6 +72,7 @@ def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> JsonObject:
             **({} if vehicle.name is None else {"name": vehicle.name}),
         },
         **({"members": list(vehicle.members)} if vehicle.members else {}),
+        "verdict": verdict(timeline, vehicle).members(),
         "totals": {
             "seconds": _seconds(whole.watched),
             "arm_cycles": len(whole.arm_cycles),
@@ -144,6 +147,7 @@ def as_html(timelines: Sequence[Timeline], made_by: str) -> str:
     )
     parts = {
         "policy": policy,
+        "verdicts": "\n".join(_verdicts(timelines)),
         "title": html.escape(", ".join(timeline.name for timeline in timelines)),
         "style": style,
         "script": script,
@@ -156,6 +160,20 @@ def as_html(timelines: Sequence[Timeline], made_by: str) -> str:
         name, _, following = piece.partition("}}")
         page += parts[name] + following
     return page
+
+
+def _verdicts(timelines: Sequence[Timeline]) -> Iterator[str]:
+    """The verdict on each vehicle. With several, each begins with its name."""
+    found = [(timeline, vehicle) for timeline in timelines for vehicle in timeline.vehicles]
+    for timeline, vehicle in found:
+        said = verdict(timeline, vehicle)
+        names = [timeline.name] * (len(timelines) > 1) + [_title(vehicle)] * (len(found) > 1)
+        name = f"<b>{html.escape(visible(' '.join(names)))}</b> " if names else ""
+        yield (
+            f'<div class="{said.state.tone}">{drawing(said.state.shape)}'
+            f"<p>{name}<strong>{html.escape(said.state.word)}</strong></p>"
+            f"<p>{html.escape(visible(said.sentence))}</p></div>"
+        )
 
 
 def _looks() -> dict[str, dict[str, dict[str, str]]]:
@@ -276,7 +294,7 @@ def _total(total: ReasonTotal) -> JsonObject:
 
 
 def _inhibit(total: ReasonTotal) -> JsonObject:
-    if total.name in UNCERTAIN:
+    if total.name in UNSURE:
         return {**_total(total), "kind": "unknown", "tone": "unknown"}
     tone = "warning" if remedy({"name": total.name}).person else "calm"
     return {**_total(total), "kind": "inhibit", "tone": tone}

@@ -89,7 +89,7 @@ def test_it_starts_at_the_top_on_the_worst_robot_and_stays_there_until_a_user_mo
         await press(pilot)
         assert shown(pilot)[0] == "2.1"  # the user's robot moved up, and is still the one
         assert selected(pilot) == "2.1"
-        assert text_of(pilot, "robot").startswith("● CAN MOVE  2.1")
+        assert text_of(pilot, "robot").startswith("↯ ARMED  2.1")
 
     use(source, user)
 

@@ -279,7 +279,7 @@ class Endpoint:
         got = self.totals()
         log.info(
             "%s: %d frames, %d lost, %d with a bad CRC, %d with an unknown id, %d bytes of garbage, "
-            "%d datagrams dropped; sent %s, %s",
+            "%d datagrams dropped; sent %s; %s",
             self.link.text,
             got.frames,
             got.lost,

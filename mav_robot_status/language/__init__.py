@@ -1,5 +1,4 @@
-"""The language of state: a word, shape and tone for each value, a state and a headline for each status, a remedy for each
-cause.
+"""The language of state: a word, shape and tone for each value, a state and a headline for each status, and remedies.
 
 Page, board, terminal, report, events and ground stations show what this package says. It reads the members of a JSON
 line, so that a status from a broker or a log has the same words as a live one.

@@ -97,8 +97,10 @@ def headline(line: Line, last: Line | None = None, members: Mapping[str, Line] |
     state, found = state_of(line), troubles(line)
     tone, rank = state.tone, state.rank
     own = {} if members is None else {name: members[name] for name in _members(line) if name in members}
+    if state is EMERGENCY_STOP and any(one.get("e_stopped") is not True for one in own.values()):
+        state = min((state_of(one) for one in own.values() if one.get("e_stopped") is not True), key=_rank)
     wrong = [one for each in own.values() for one in troubles(each)] if own else found
-    worst = min((one.state for one in wrong), key=lambda one: one.rank, default=None)
+    worst = min((one.state for one in wrong), key=_rank, default=None)
     if worst is not None and worst.rank < rank:
         tone, rank = worst.tone, worst.rank
     sentences = (*_of_members(own), *_why(line, last, state))
@@ -106,6 +108,10 @@ def headline(line: Line, last: Line | None = None, members: Mapping[str, Line] |
     steps = [remedy({"name": UNHEARD})] if state in (LOST, NOT_HEARD) else [remedy(cause) for cause in reported]
     step = next((one for one in steps if one.person), steps[0] if steps else None)
     return Headline(state, tone, rank, tuple(dict.fromkeys(sentences)), *((step.step, step.topic) if step else ()))
+
+
+def _rank(state: State) -> int:
+    return state.rank
 
 
 def _members(line: Line) -> list[str]:

@@ -58,9 +58,7 @@ INHIBIT_ROWS: Final[dict[str, Remedy]] = {
     "CALIBRATING": Remedy(
         "the autopilot is calibrating its sensors", "Wait, and keep the vehicle still.", "starting", person=False
     ),
-    "POWERING_OFF": Remedy(
-        "the autopilot is shutting down", "To drive, switch it on again.", "starting", person=False
-    ),
+    "POWERING_OFF": Remedy("the autopilot is shutting down", "To drive, switch it on again.", "starting", person=False),
     "TERMINATION": Remedy("its operation was terminated", _INSPECT, "crash"),
     "EMERGENCY": Remedy("the autopilot reports an emergency", _INSPECT, "crash"),
     "HIL": Remedy(
@@ -79,9 +77,7 @@ INHIBIT_ROWS: Final[dict[str, Remedy]] = {
         "Look at its emergency stop, and let the autopilot report it.",
         "emergency-stop",
     ),
-    "SENDER_UNCERTAIN": Remedy(
-        "another device may use its system id", _SYSID, "senders"
-    ),
+    "SENDER_UNCERTAIN": Remedy("another device may use its system id", _SYSID, "senders"),
     "HEARTBEAT_LATE": Remedy(
         "frames arrive, but the heartbeat is late",
         "Look for a radio or a program that stores frames. The command doctor says how late they are.",
@@ -143,9 +139,7 @@ ERROR_ROWS: Final[dict[str, Remedy]] = {
     "MISSION": Remedy(
         "its mission cannot continue", "Check the mission, and write it to the autopilot again.", "mission"
     ),
-    "SYSTEM_ID_CONFLICT": Remedy(
-        "two autopilots use one system id", _SYSID, "senders"
-    ),
+    "SYSTEM_ID_CONFLICT": Remedy("two autopilots use one system id", _SYSID, "senders"),
     "LINK_LOST": Remedy("its autopilot is not heard", "Check its power, the radio and the cable.", "link"),
     **{
         f"TEXT_{level}": Remedy("the autopilot reports a problem", _LOOK, "arming")
@@ -228,9 +222,7 @@ ARM_ROWS: Final[dict[str, Remedy]] = {
     ),
     "BOOTING": Remedy("the controller is starting", "Wait until the controller has started.", "starting", person=False),
     "POWER_OFF": Remedy("the arm has no power", "To move it, switch the arm on.", "robot-arm", person=False),
-    "BRAKES_ENGAGED": Remedy(
-        "its brakes are engaged", "To move it, release the brakes.", "robot-arm", person=False
-    ),
+    "BRAKES_ENGAGED": Remedy("its brakes are engaged", "To move it, release the brakes.", "robot-arm", person=False),
     "BACKDRIVE": Remedy("a person moves it by hand", "Wait until that person has finished.", "robot-arm", person=False),
     "UPDATING_FIRMWARE": Remedy(
         "its firmware is being updated", "Wait, and leave the controller switched on.", "starting", person=False

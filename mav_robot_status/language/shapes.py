@@ -1,4 +1,4 @@
-"""The drawings of the shapes, as SVG on a field of 20 x 20: `fill`, `line`, `dash`, `dots` and `cut` are classes of the page."""
+"""The drawings of the shapes, as SVG on a field of 20 x 20. The classes in them are those of the style sheets."""
 
 from __future__ import annotations
 

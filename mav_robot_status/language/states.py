@@ -138,7 +138,9 @@ def state_of(line: JsonMapping) -> State:
         return MOVING
     possible, powered = line.get("motion_possible"), line.get("drives_powered")
     found = troubles(line)
-    if found and not (line.get("members") and possible is not False and found[0].state is EMERGENCY_STOP):
+    if line.get("members") and not (possible is False and powered is False):
+        found = [one for one in found if one.state is not EMERGENCY_STOP]  # a member may be live
+    if found:
         return found[0].state
     if powered is True or possible is True:
         return ARMED
@@ -176,7 +178,7 @@ def few_words(cause: JsonMapping, line: JsonMapping) -> str:
         return _PREFIX.sub("", text) or text
     if name in CONFLICTS:
         return sentence({**cause, "handle": None}, line)
-    if name.removeprefix("SENSOR_") in SENSOR_ROWS and name.startswith("SENSOR_") or name in WORDS_DECIDE:
+    if (name.removeprefix("SENSOR_") in SENSOR_ROWS and name.startswith("SENSOR_")) or name in WORDS_DECIDE:
         return re.sub(r"^(the|an?|its) ", "", remedy(cause).sentence)
     words = [INITIALS.get(word, word) for word in spoken(name).split()]
     return " ".join(words)

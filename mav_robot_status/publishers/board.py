@@ -53,7 +53,7 @@ class Transition(NamedTuple):
 class Entry:
     """The latest status of one handle."""
 
-    __slots__ = ("at", "began", "heartbeat_age", "last", "line", "lines", "stamp", "version", "_kept")
+    __slots__ = ("_kept", "at", "began", "heartbeat_age", "last", "line", "lines", "stamp", "version")
 
     def __init__(self, now: float) -> None:
         self.began = now
@@ -80,9 +80,7 @@ class Entry:
 
     def kept_since(self) -> dict[str, float]:
         """From when the value of each field is known, monotonic seconds."""
-        return {
-            name: kept[0].at if len(kept) == MOST_TRANSITIONS else self.began for name, kept in self._kept.items()
-        }
+        return {name: kept[0].at if len(kept) == MOST_TRANSITIONS else self.began for name, kept in self._kept.items()}
 
     def keep(self, new: Transition) -> None:
         """Keep a change."""

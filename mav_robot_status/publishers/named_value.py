@@ -62,7 +62,7 @@ def texts(
 ) -> list[Text]:
     """What a ground station has to be told, the worst first: one text for each event since it was told `known`.
 
-    `before` is the mode of which it was told; None: it was told nothing. `age` is that of the last heartbeat, in seconds.
+    `before` is the mode of which it was told; None: it was told nothing. `age` is that of the last heartbeat, seconds.
     """
     state, now = state_of(line), {one.key: one for one in troubles(line)}
     if state is UNKNOWN:

@@ -1,7 +1,8 @@
-"""The verdict on one vehicle of a log: the word of its worst state, and one sentence of when, what, after what, how it ended."""
+"""The verdict on a vehicle of a log: the word of its worst state, and a sentence with when, what and how it ended."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from ..clock import rfc3339
@@ -116,7 +117,7 @@ def _value_at(spans: Sequence[Span], at: int) -> Span | None:
 
 
 def _disarmed_after(vehicle: VehicleTimeline, at: int) -> str:
-    for before, after in zip(vehicle.tracks["armed"], vehicle.tracks["armed"][1:]):
+    for before, after in pairwise(vehicle.tracks["armed"]):
         if before.value == "TRUE" and after.value == "FALSE" and after.start >= at:
             return f"; disarmed {_lasted(after.start - at)} later"
     return ""

@@ -245,7 +245,9 @@ def _tell_strangers(tracked: TrackedVehicle, main: Speaker, rivals: Sequence[Spe
         return
     tracked.tell_strangers_at = now + PACE
     cure = (
-        f"If one of them is yours, name it: {found.mine}" if found.mine else "Give each vehicle a system id of its own."
+        f"If one of them is yours, name it: {found.mine}"
+        if found.mine
+        else "Give each autopilot its own system id (SYSID_THISMAV)."
     )
     log.warning("Two senders speak as vehicle %d.%d: %s. %s", *(tracked.ids or (0, 0)), found.who, cure)
 

@@ -79,7 +79,8 @@ class WatchApp(App[None]):
     .small Table { height: 1fr; max-height: 100%; } #more { height: 1; }
     #pane { height: 1fr; border-top: solid ansi_bright_black; scrollbar-size: 1 1; } #pane Static { height: auto; }
     #log { height: 1; } Input { height: 1; border: none; padding: 0; display: none; }
-    .zoomed Table, .zoomed #more { display: none; } .small #pane { height: 3; } .zoomed #pane { height: 1fr; border: none; }
+    .zoomed Table, .zoomed #more { display: none; } .small #pane { height: 3; border: none; }
+    .zoomed #pane { height: 1fr; border: none; }
     .small #log { display: none; }
     """
     BINDINGS: ClassVar = [
@@ -157,7 +158,9 @@ class WatchApp(App[None]):
             self.exit()
             return
         log = self._log_lines.lines[-1] if self._log_lines.lines else ("", False)
-        table = self.query_one(Table)
+        table = next(iter(self.query(Table)), None)
+        if table is None:  # the screen is being closed
+            return
         seen = (source.version, now.mono // AGES, log, self.size, self._chosen, self._pane, table.scroll_y, table.size)
         if seen == self._drawn:
             return

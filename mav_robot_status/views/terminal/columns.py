@@ -96,7 +96,9 @@ NAME: Final = Column("name", "robot", 6, ALWAYS, name_of, by_name)
 """Its width fits the names."""
 WHY: Final = Column("why", "why", LEAST_WHY, ALWAYS, why, by_urgency)
 """Its width is what the others leave."""
-HEARD: Final = Column("heard", "heard", 6, 8, _heard, lambda robot: -(robot.row.age if robot.row.age is not None else 1e9))
+HEARD: Final = Column(
+    "heard", "heard", 6, 8, _heard, lambda robot: -(robot.row.age if robot.row.age is not None else 1e9)
+)
 COLUMNS: Final = (
     STATE,
     NAME,

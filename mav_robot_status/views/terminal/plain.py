@@ -30,6 +30,7 @@ MOST_KEYS: Final = 64
 GROUNDS: Final = {f"on {name}": 40 + i for i, name in enumerate(PALETTE)}
 
 
+UTF8: Final = Signs()
 NARROW: Final = 70
 KEYS: Final = {"j": 1, "\x1b[B": 1, "k": -1, "\x1b[A": -1}
 """By how many rows a key scrolls."""
@@ -69,9 +70,7 @@ def _row(shown: Sequence[Column], robot: Robot, signs: Signs) -> Line:
     return tuple(span for column in shown for span in cell(column, robot, signs))
 
 
-def frame(
-    lines: Iterator[Line], last: list[Line], size: os.terminal_size, colours: bool, signs: Signs = Signs()
-) -> str:
+def frame(lines: Iterator[Line], last: list[Line], size: os.terminal_size, colours: bool, signs: Signs = UTF8) -> str:
     """The lines as one text for the terminal, cut to its size. The `last` ones stand at its bottom."""
     room = size.lines - len(last)
     body: list[Line] = []

@@ -102,6 +102,15 @@ def test_a_group_says_of_each_member_what_it_is() -> None:
     assert headline(lost, None, members).sentences[0].text == "arm is LOST and may move; base is PARKED"
 
 
+def test_a_stop_of_one_member_is_never_that_of_the_group() -> None:
+    stop = {"name": "E_STOPPED", "text": None, "since": STAMP}
+    stopped = line(e_stopped=True, inhibits=[stop])
+    whole = line(members=["base", "arm"], e_stopped=True)  # a site may configure a group so
+    assert headline(whole, None, {"base": stopped, "arm": line(**LIVE)}).word == "ARMED"
+    assert headline(whole, None, {"base": stopped, "arm": stopped}).word == "EMERGENCY STOP"
+    assert headline({**whole, "drives_powered": True}).word != "EMERGENCY STOP"
+
+
 def test_of_a_moving_robot_nothing_says_that_it_cannot_move() -> None:
     assert spoken(headline(line(in_motion=True))).startswith("It ignores motion commands: it is disarmed.")
 

@@ -125,7 +125,10 @@ def said(mirror: NamedValuePublisher, port: Port, *steps: tuple[float, RobotStat
         ),
         (((0.0, FAILING, CRASH),), [CRASHED_TEXT]),
         (((0.0, FAILING, LOW),), [(3, "FAULT: battery low")]),
-        (((0.0, FAILING, LOW), (5.0, FREE, Detail(1, 1))), [(3, "FAULT: battery low"), (6, "Fault ended: battery low")]),
+        (
+            ((0.0, FAILING, LOW), (5.0, FREE, Detail(1, 1))),
+            [(3, "FAULT: battery low"), (6, "Fault ended: battery low")],
+        ),
         (((0.0, FREE._replace(mode=RobotMode.MANUAL), Detail(1, 1)),), [MANUAL_TEXT]),
         (
             ((0.0, FAILING, Detail(3, 1, (ErrorCause(9002, "SYSTEM_ID_CONFLICT", None, 0),))),),
@@ -143,7 +146,9 @@ def test_an_event_is_one_text_in_words_with_its_severity(
 
 
 def test_a_robot_that_cannot_arm_says_why(mirror: NamedValuePublisher, port: Port) -> None:
-    refused = Detail(1, 1, inhibits=(Inhibit("PREARM_FAILING", "PreArm: GPS 1: Bad fix", 0), Inhibit("DISARMED", None, 0)))
+    refused = Detail(
+        1, 1, inhibits=(Inhibit("PREARM_FAILING", "PreArm: GPS 1: Bad fix", 0), Inhibit("DISARMED", None, 0))
+    )
     parked = PARKED._replace(mode=RobotMode.AUTO, drives_powered=TriState.FALSE, e_stopped=TriState.FALSE)
     assert said(mirror, port, (0.0, parked, refused)) == [(4, "CANNOT ARM: GPS 1: Bad fix")]
 

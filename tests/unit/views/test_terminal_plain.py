@@ -19,7 +19,9 @@ from mav_robot_status.views.terminal.text import Signs, Span
 from .fleet import CRASH, DISARMED, DRIVING, FAILED, PARKED, RADIO, START, Source, put, robots, texts
 
 
-def drawn(board: Board, columns: int, lines: int, colours: bool = False, signs: Signs | None = None, top: int = 0) -> str:
+def drawn(
+    board: Board, columns: int, lines: int, colours: bool = False, signs: Signs | None = None, top: int = 0
+) -> str:
     size = os.terminal_size((columns, lines))
     signs = signs or Signs()
     shown = screen(Source(board), robots(board), size, signs, lines - 1, top)
@@ -39,7 +41,11 @@ def test_a_screen_has_counts_table_details_and_the_footer_at_its_bottom() -> Non
     lines = [line.removesuffix("\x1b[K") for line in drawn(board, 80, 24).split("\r\n")]
     assert len(lines) == 24
     assert lines[0] == "\x1b[Hudp:127.0.0.1:14550  2 robots, 1 in error, 1 can move"
-    assert [line[:18].strip() for line in lines[1:4]] == ["state            r", "◆ FAULT          1", "▪ PARKED         2"]
+    assert [line[:18].strip() for line in lines[1:4]] == [
+        "state            r",
+        "◆ FAULT          1",
+        "▪ PARKED         2",
+    ]
     assert lines[5].startswith("◆ FAULT  1.1  GROUND_ROVER")
     assert lines[-1] == "the story\x1b[K\x1b[J"
 
@@ -195,4 +201,6 @@ def test_the_last_lines_of_the_log_are_kept_only() -> None:
 def test_the_lines_of_a_screen_are_spans() -> None:
     board = Board()
     put(board)
-    assert texts(screen(Source(board), robots(board), os.terminal_size((80, 24)), Signs()))[2].startswith("▶ MOVING         1.1 ")
+    assert texts(screen(Source(board), robots(board), os.terminal_size((80, 24)), Signs()))[2].startswith(
+        "▶ MOVING         1.1 "
+    )

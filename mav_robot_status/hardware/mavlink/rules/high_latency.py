@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from ....interface.status import RobotMode
-from .drives_powered import is_initialising
+from .drives_powered import is_initialising, off
 from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 from .simulation import actuators_blocked
 
@@ -47,7 +47,7 @@ def motion_possible(facts: Facts, options: HardwareOptions, mode: FlightMode, dr
     """Impossible without power; otherwise unknown, because the state is."""
     powered, why = drives
     if powered is FALSE:
-        return FALSE, why._replace(rule=f"drives_powered is false: {why.rule}")
+        return FALSE, why._replace(rule=off(why.rule))
     if options.manual_blocks_motion and mode.mode is RobotMode.MANUAL:
         return FALSE, Reason("manual mode (manual_blocks_motion)", SOURCE)
     if powered is UNKNOWN:

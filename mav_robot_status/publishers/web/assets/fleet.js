@@ -86,10 +86,11 @@ export class Rows {
     let after = null;
     for (const robot of robots) {
       const known = this.rows.get(robot.line.handle);
-      const row = known && !all && known.row.isSeen === false ? known.row : this.row(robot);
+      const next = after === null ? this.body.firstChild : after.nextSibling;
+      const waits = known !== undefined && !all && known.row === next && known.row.isSeen === false;
+      const row = waits ? known.row : this.row(robot);
       row.classList.toggle("member", below.has(robot.line.handle));
       seen.add(robot.line.handle);
-      const next = after === null ? this.body.firstChild : after.nextSibling;
       if (next !== row) this.body.insertBefore(row, next);
       after = row;
     }

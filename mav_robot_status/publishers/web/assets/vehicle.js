@@ -84,7 +84,7 @@ export class VehiclePage {
     const asof = at("asof");
     if (!asof || !this.line) return;
     const age = this.line.link?.state === "NEVER_SEEN" ? "no heartbeat yet" : `heard ${ago(robot.currentAge())}`;
-    setText(asof, live && !robot.stale() ? age : `as of ${clock(robot.stamp)}, ${age}`);
+    setText(asof, live && !robot.stale() ? age : `as of ${clock(robot.stamp)}`);
     setText(at("link-age"), age);
     const transitions = this.history.transitions.map((t) => ({ ...t, ago: now - t.at }));
     const keptFor = (name) => now - (this.history.since.get(name) ?? now);

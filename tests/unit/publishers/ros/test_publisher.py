@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from mav_robot_status.clock import Instant, later
-from mav_robot_status.extras import install
 from mav_robot_status.errors import UsageError
+from mav_robot_status.extras import install
 from mav_robot_status.interface import PublisherContext, RobotStatusMsg
 from mav_robot_status.publishers.ros import publisher as module
 from mav_robot_status.publishers.ros.publisher import Ros2Publisher

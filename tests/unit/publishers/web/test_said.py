@@ -50,7 +50,11 @@ def test_what_is_said_is_bounded() -> None:
 
 def test_only_a_cause_gets_words() -> None:
     assert with_words("AUTO") == "AUTO"
-    assert with_words({"name": "DISARMED", "begins": True}) == {"name": "DISARMED", "begins": True, "words": "it is disarmed"}
+    assert with_words({"name": "DISARMED", "begins": True}) == {
+        "name": "DISARMED",
+        "begins": True,
+        "words": "it is disarmed",
+    }
 
 
 @given(

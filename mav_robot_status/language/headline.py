@@ -17,6 +17,7 @@ from .states import (
     LOST,
     MOVING,
     NOT_HEARD,
+    PARKED,
     READY,
     UNHEARD,
     UNKNOWN,
@@ -148,7 +149,7 @@ def _why(line: Line, last: Line | None, state: State) -> Iterator[Sentence]:
         yield MAY_MOVE
         return
     yield from _standing(line, state)
-    yield from (_quoted(one, line) for one in unsure if one.get("name") == UNHEARD)
+    yield from (_quoted(one, line) for one in unsure if state is PARKED or one.get("name") == UNHEARD)
     yield from () if isinstance(line.get("in_motion"), bool) else (MOTION_UNKNOWN,)
     if line.get("motion_possible") is not False:
         yield _charge(line)

@@ -15,6 +15,7 @@ from ..language.states import (
     NOT_HEARD,
     PARKED,
     READY,
+    SHOWN_BY,
     UNKNOWN,
     few_words,
     sentence,
@@ -91,7 +92,10 @@ def _cause(one: Reason) -> JsonMapping:
 def _of_error(timeline: Timeline, vehicle: VehicleTimeline, one: Reason) -> str:
     """` at 11:07:10, 15 s into AUTO: “Crash: Going to HOLD”; disarmed 2 s later.`"""
     what = f"“{one.text}”" if one.text else sentence(_cause(one), {"system": vehicle.system})
-    others = {other.title for other in vehicle.errors} - {one.title}
+    names = {other.name for other in vehicle.errors}
+    others = {other.title for other in vehicle.errors if not names & SHOWN_BY.get(other.name, frozenset())} - {
+        one.title
+    }
     also = f"; {len(others)} other {'error' if len(others) == 1 else 'errors'}" if others else ""
     ended = _disarmed_after(vehicle, one.start) or _ended(timeline, one.end)
     return f" at {_clock(timeline, one.start)}{_into(vehicle, one.start)}: {what[:120]}{ended}{also}."

@@ -109,7 +109,7 @@ class Gateway:
                 self._airs.append(link)
             return link  # type: ignore[no-any-return]
 
-        with mock.patch("mav_robot_status.gateway.endpoint.open_guarded", open_air):
+        with mock.patch("mav_robot_status.gateway.links.endpoint.open_guarded", open_air):
             self.hardware = MavlinkHardware(config, lambda: self.now)
         self._sources = list(self.hardware.sources())
 

@@ -95,6 +95,8 @@ class Sender:
         self.forked = False
         """Whether a router copies its frames on all its ways. Else each way has its own count."""
         self.counts: dict[Any, int] = {}
+        self.latest: dict[Any, int] = {}
+        """The latest number on each way, also from before a reboot."""
         self.starts_at = now
         """It says nothing before: a boot takes time."""
         self.spoke: dict[Any, float] = {}
@@ -242,7 +244,7 @@ class World:
         if silence > SILENCE:
             number = number + round(RATE * silence) & 255
         if sender.who == OTHER or silence > SILENCE:
-            taken = tuple(self.senders[1 - sender.who].counts.values())
+            taken = tuple(self.senders[1 - sender.who].latest.values())
             if any(_distance(number, count) < FAR for count in taken):
                 number = max(range(0, 256, 8), key=lambda free: min(_distance(free, count) for count in taken))
         jumps = number != sender.counts.get(way)
@@ -252,6 +254,7 @@ class World:
         self._used[sender.who, way, number] = self.now.mono
         sender.spoke[way] = self.now.mono
         sender.counts[way] = number + 1 & 255
+        sender.latest[way] = number
         return number
 
     def _arrive(self, said: Said) -> None:

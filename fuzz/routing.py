@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Final
 
-from mav_robot_status.gateway.routing import Router
+from mav_robot_status.gateway.links.routing import Router
 from mav_robot_status.mavlink.commands import HEARTBEAT
 from mav_robot_status.mavlink.definitions import Attitude, CommandLong, Heartbeat
 from mav_robot_status.mavlink.encode import encode

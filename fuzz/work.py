@@ -71,7 +71,7 @@ def checks(pieces: Sequence[bytes]) -> tuple[int, int]:
     with mock.patch.object(framing, "crc_hqx", counted):
         parser = Parser(WANTED_IDS)
         for piece in pieces:
-            parser.walk(piece)
+            parser.feed(piece)
     return len(lengths), sum(lengths)
 
 
@@ -83,7 +83,7 @@ def nanoseconds(data: bytes, piece: int, repeats: int = 5) -> float:
         parser = Parser(WANTED_IDS)
         before = time.process_time()
         for one in pieces:
-            parser.walk(one)
+            parser.feed(one)
         best = min(best, time.process_time() - before)
     return best / len(data) * 1e9
 

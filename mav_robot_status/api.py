@@ -10,24 +10,21 @@ import itertools
 import os
 import threading
 import weakref
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import Final
 
 from .config import Config, ControllerConfig, LinkConfig, PublisherConfig
 from .config import load as load_config
 from .errors import UsageError
 from .gateway.controller_config import DEFAULT_CONTROLLER
 from .gateway.event_loop import EventLoop
-from .gateway.recorded_log import Recording
+from .gateway.logs.recorded_log import Recording
 from .gateway.replay import ReplayPipeline, run_through
+from .interface import Publisher, RobotStatusMsg
 from .links.url import parse
 from .publishers.queue import QueuePublisher
 from .streams import NO_OUTPUT
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-    from types import TracebackType
-
-    from .interface import Publisher, RobotStatusMsg
 
 PATIENCE: Final = 5.0  # s for the gateway to end
 QUEUE: Final = dataclasses.replace(DEFAULT_CONTROLLER, publishers=(PublisherConfig("queue"),))

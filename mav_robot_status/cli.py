@@ -8,22 +8,17 @@ import os
 import signal
 import sys
 import threading
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Sequence
+from typing import NoReturn
 
-from .commands import COMMANDS, PROGRAM, command, importing
+from .commands import COMMANDS, PROGRAM, command
 from .errors import MavRobotStatusError, UsageError
 from .streams import StderrHandler, complain, detach, open_missing, writing
 from .version import __version__
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
 
 class _Arguments(argparse.ArgumentParser):
     """Reports an error in one line. argparse would print all options first."""
-
-    words: Sequence[str] | None = None
-    """The arguments that will be read; None if they are not known."""
 
     def error(self, message: str) -> NoReturn:
         """Raises UsageError."""
@@ -65,8 +60,7 @@ def _doubt_command(first: Sequence[str]) -> None:
 
 def _run(arguments: list[str]) -> int:
     try:
-        with importing():
-            options = _options(arguments)
+        options = _options(arguments)
         if "verbose" in options:
             _log_to_stderr(options)
         return command(options.command).run(options)
@@ -83,7 +77,6 @@ def _options(arguments: list[str]) -> argparse.Namespace:
 
     name = arguments[0]
     parser = _Arguments(prog=f"{PROGRAM} {name}", formatter_class=Help)
-    parser.words = arguments[1:]
     command(name).arguments(parser)
     return parser.parse_args(arguments[1:], argparse.Namespace(command=name))
 

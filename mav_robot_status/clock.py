@@ -5,9 +5,7 @@ from __future__ import annotations
 import time
 from datetime import datetime, timezone
 from functools import lru_cache
-from typing import Final
-
-from .values import NamedTuple
+from typing import Final, NamedTuple
 
 FIRST_SECOND: Final = 0
 LAST_SECOND: Final = 253_402_300_799  # 9999-12-31T23:59:59Z

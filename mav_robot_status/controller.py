@@ -10,16 +10,21 @@ import logging
 import math
 import sys
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
+from .clock import Instant
 from .errors import ConfigError
-from .interface import DEFAULT_HANDLE_NAME, IndustrialRobotStatusHandle, IndustrialRobotStatusInterface, RobotStatusMsg
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from .clock import Instant
-    from .interface import Detail, InterfaceManager, Publisher, RobotStatus
+from .interface import (
+    DEFAULT_HANDLE_NAME,
+    Detail,
+    IndustrialRobotStatusHandle,
+    IndustrialRobotStatusInterface,
+    InterfaceManager,
+    Publisher,
+    RobotStatus,
+    RobotStatusMsg,
+)
 
 log = logging.getLogger(__name__)
 

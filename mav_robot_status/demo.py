@@ -10,9 +10,10 @@ import contextlib
 import dataclasses
 import logging
 import socket
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final, NamedTuple, TextIO
 
-from .config import Config, GroupConfig, HardwareConfig, LinkConfig, PublisherConfig, VehicleConfig
+from .config import Config, ControllerConfig, GroupConfig, HardwareConfig, LinkConfig, PublisherConfig, VehicleConfig
 from .errors import LinkError, UsageError
 from .gateway.background import BackgroundGateway
 from .gateway.controller_config import DEFAULT_CONTROLLER
@@ -21,6 +22,8 @@ from .links.udp import UdpLink
 from .links.url import parse
 from .testing import (
     DEMO,
+    Scenario,
+    Step,
     arduboat,
     arducopter,
     arduplane,
@@ -36,16 +39,8 @@ from .testing.fake_arm import FakeArm
 from .testing.fake_fleet import FakeFleet
 from .testing.mobile_manipulator import BASE, follow
 from .testing.scenario import ending
-from .values import NamedTuple
+from .testing.udp_fake import Address
 from .views import terminal
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from typing import TextIO
-
-    from .config import ControllerConfig
-    from .testing import Scenario, Step
-    from .testing.udp_fake import Address
 
 log = logging.getLogger(__name__)
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, insort
+from collections.abc import Hashable
 from itertools import count
-from typing import TYPE_CHECKING, Generic, TypeVar
-
-if TYPE_CHECKING:
-    from collections.abc import Hashable
+from typing import Generic, TypeVar
 
 K = TypeVar("K", bound="Hashable")
 

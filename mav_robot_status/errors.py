@@ -1,6 +1,6 @@
 """The errors that a user can act on. Each message says in one line what is wrong, where, and what is expected.
 
-A peer never causes one of these: bad frames are counted.
+A peer never causes one of these, but a ProtocolError, which no user sees: it becomes a line of the log.
 """
 
 from __future__ import annotations
@@ -34,3 +34,7 @@ class UnknownHandleError(MavRobotStatusError):
     """No handle has this name. The message lists the registered names."""
 
     exit_code = 2
+
+
+class ProtocolError(Exception):
+    """A peer does not speak its protocol as expected. The text says why; the connection is of no use any more."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections import deque
-from typing import TYPE_CHECKING, Final
-
-if TYPE_CHECKING:
-    import logging
+from typing import Final
 
 PERIOD: Final = 30.0
 """Seconds in which there is one line of a kind."""

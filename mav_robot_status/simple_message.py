@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import struct
 from operator import attrgetter
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from .values import NamedTuple
+from .errors import ProtocolError
 
 if TYPE_CHECKING:
     from .interface import RobotStatus
@@ -63,10 +63,6 @@ class StatusFrame(NamedTuple):
 assert StatusFrame._fields == FIELDS
 
 
-class FrameError(Exception):
-    """The peer does not speak simple_message as expected. The text says why; the connection is of no use any more."""
-
-
 class StatusEncoder:
     """Makes a STATUS frame of a status."""
 
@@ -90,17 +86,17 @@ class StatusReader:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[StatusFrame]:
-        """The statuses that end in `data`. Raises FrameError."""
+        """The statuses that end in `data`. Raises ProtocolError."""
         buffer, at, found = self._rest + data, 0, []
         while len(buffer) - at >= self._header.size:
             length, kind, communication = self._header.unpack_from(buffer, at)
             if not HEADER <= length <= LONGEST_LENGTH:
-                raise FrameError(self._garbage(buffer[at : at + HEADER]))
+                raise ProtocolError(self._garbage(buffer[at : at + HEADER]))
             if len(buffer) - at < PREFIX + length:
                 break
             if kind == STATUS and communication == TOPIC:
                 if length != STATUS_LENGTH:
-                    raise FrameError(f"a STATUS has the length {length} instead of {STATUS_LENGTH}")
+                    raise ProtocolError(f"a STATUS has the length {length} instead of {STATUS_LENGTH}")
                 found.append(StatusFrame(*self._body.unpack_from(buffer, at + SHORTEST)))
             at += PREFIX + length
         self._rest = buffer[at:]  # less than one frame

@@ -6,14 +6,9 @@ arguments that several commands share; `overrides` and `arms` apply them to the 
 
 from __future__ import annotations
 
-import gc
-from contextlib import contextmanager
+import argparse
 from importlib import import_module
-from typing import TYPE_CHECKING, Final, Protocol, cast
-
-if TYPE_CHECKING:
-    import argparse
-    from collections.abc import Iterator
+from typing import Final, Protocol, cast
 
 PROGRAM: Final = "mav-robot-status"
 COMMANDS: Final = {
@@ -41,17 +36,6 @@ class Command(Protocol):
 
     def run(self, options: argparse.Namespace) -> int:
         """Run the command and return its exit code. Raises MavRobotStatusError."""
-
-
-@contextmanager
-def importing() -> Iterator[None]:
-    """Pause the garbage collector while modules are imported: it would only search objects that stay."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.enable()
 
 
 def command(name: str) -> Command:

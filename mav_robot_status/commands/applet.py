@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ..data_files import data_file
 from ..errors import LinkError
 from ..streams import say
-
-if TYPE_CHECKING:
-    import argparse
 
 NAME: Final = "robot_status.lua"
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import argparse
 
 from ..errors import UsageError
 from ..extras import install
-from ..publishers.mqtt.options import BrokerOptions
-from ..publishers.web.options import DEFAULT_LISTEN, HttpOptions
+from ..publishers.mqtt.settings import BrokerOptions
+from ..publishers.web.settings import DEFAULT_LISTEN, HttpOptions
 from .options import given, publisher, verbosity
-
-if TYPE_CHECKING:
-    import argparse
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

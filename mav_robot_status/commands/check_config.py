@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import argparse
 
 from ..config import describe, load
 from ..streams import say
-
-if TYPE_CHECKING:
-    import argparse
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +16,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print what the configuration means. Raises ConfigError, which names the place of an error, or UsageError."""
     from ..gateway.controller_config import check
-    from ..gateway.event_table_file import event_table
+    from ..gateway.events.file import event_table
 
     config = load(options.file)
     check(config)

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator
+from typing import Final, NamedTuple
 
-from ..values import NamedTuple
 from . import COMMANDS, PROGRAM, command
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 SHELLS: Final = ("bash", "zsh", "fish")
 FILES: Final = ("FILE", "DIR", "LOG", "CONNECTION")

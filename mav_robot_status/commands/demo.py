@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from ..config import ControllerConfig
 from ..errors import UsageError
-from ..publishers.ros.options import Ros2Options
+from ..publishers.ros.settings import Ros2Options
 from ..publishers.simple_message.options import SimpleMessageOptions
-from ..publishers.web.options import DEFAULT_LISTEN, HttpOptions
-from .options import publisher, verbosity
+from ..publishers.web.settings import DEFAULT_LISTEN, HttpOptions
+from .options import number, publisher, verbosity
 from .overrides import with_publisher
 
-if TYPE_CHECKING:
-    from ..config import ControllerConfig
-
 MOST_VEHICLES: Final = 254
+vehicles: Final = number(int, 1, MOST_VEHICLES, f"a number of vehicles; write 1 to {MOST_VEHICLES}")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,14 +36,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     publisher(parser, SimpleMessageOptions)
     publisher(parser, Ros2Options)
     verbosity(parser)
-
-
-def vehicles(text: str) -> int:
-    """A number of vehicles. Raises ArgumentTypeError."""
-    with contextlib.suppress(ValueError):
-        if 1 <= (number := int(text)) <= MOST_VEHICLES:
-            return number
-    raise argparse.ArgumentTypeError(f"{text!r} is not a number of vehicles; write 1 to {MOST_VEHICLES}")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import argparse
 
 from ..links.url import parse
-from ..publishers.ros.options import Ros2Options
+from ..publishers.ros.settings import Ros2Options
 from ..streams import say
 from .options import connections, given, looking, publisher, seconds
 from .overrides import configured
-
-if TYPE_CHECKING:
-    import argparse
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

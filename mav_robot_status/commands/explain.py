@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
-from typing import TYPE_CHECKING
 
 from ..errors import NothingHeardError, UsageError
 from ..links.url import parse
 from ..streams import say
 from .options import connections, looking
 from .overrides import configured
-
-if TYPE_CHECKING:
-    import argparse
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

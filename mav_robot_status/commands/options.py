@@ -10,27 +10,28 @@ import contextlib
 import os
 import re
 import sys
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Container
+from typing import Any, Final, TypeVar
 
 from ..config.model import LONGEST_NAME, is_vehicle_name
+from ..interface import Options
 from ..links.url import help_text
+from ..publishers.mqtt.settings import MqttOptions
+from ..publishers.ros.settings import Ros2Options
+from ..publishers.simple_message.options import SimpleMessageOptions
+from ..publishers.web.settings import HttpOptions
 
-if TYPE_CHECKING:
-    from collections.abc import Container, Iterable
-
-    from ..interface import Options
+N = TypeVar("N", int, float)
 
 _NAMED: Final = re.compile(r"([0-9]{1,3})(?:\.([0-9]{1,3}))?=(.*)", re.ASCII | re.DOTALL)
 
-WITH_ARGUMENTS: Final = {
-    "http": (("--http", "--alarm"), "publishers.web.options", "HttpOptions"),
-    "mqtt": (("--mqtt",), "publishers.mqtt.options", "MqttOptions"),
-    "simple_message": (("--simple-message",), "publishers.simple_message.options", "SimpleMessageOptions"),
-    "ros2": (("--ros2",), "publishers.ros.options", "Ros2Options"),
+WITH_ARGUMENTS: Final[dict[str, type[Options]]] = {
+    "http": HttpOptions,
+    "mqtt": MqttOptions,
+    "simple_message": SimpleMessageOptions,
+    "ros2": Ros2Options,
 }
-"""The publishers that the command line can add. For each: the beginnings of its flags, first that of the flag that
-enables it; and the class that declares its options."""
+"""The publishers that the command line can add, by type: the first option of each has the flag that enables it."""
 
 FORMS = "forms"
 """A placeholder in a parser for the connection forms: finding every kind of link scans the installed packages."""
@@ -112,34 +113,9 @@ def publisher(parser: argparse.ArgumentParser, options: type[Options], without: 
 
 
 def publishers(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the publishers in WITH_ARGUMENTS that the given ones may name: the first flag enables each.
-
-    To declare the arguments of one publisher takes 1 % of the time in which a gateway starts.
-    """
-    words = getattr(parser, "words", None)
-    for kind, (flags, _, _) in WITH_ARGUMENTS.items():
-        if words is None or any(may_name(flag, words) for flag in flags):
-            publisher(parser, options_of(kind))
-
-
-def options_of(kind: str) -> type[Options]:
-    """The options of a publisher in WITH_ARGUMENTS."""
-    _, module, name = WITH_ARGUMENTS[kind]
-    found: type[Options] = getattr(import_module(f"...{module}", __name__), name)
-    return found
-
-
-def may_name(flag: str, words: Iterable[str]) -> bool:
-    """Whether one of these arguments may be a flag that begins with `flag`, abbreviated or not, or asks for help."""
-    for word in words:
-        name = word.partition("=")[0]
-        if name[:1] != "-":
-            continue
-        if name.startswith(flag) or flag.startswith(name) or "--help".startswith(name):
-            return True
-        if name[:2] != "--" and "h" in name:  # -qh
-            return True
-    return False
+    """The arguments of all publishers that the command line can add. The first flag of each enables it."""
+    for options in WITH_ARGUMENTS.values():
+        publisher(parser, options)
 
 
 def given(options: argparse.Namespace, declared: type[Options]) -> dict[str, object]:
@@ -160,33 +136,23 @@ def verbosity(parser: argparse.ArgumentParser) -> None:
     group.add_argument("-q", "--quiet", action="store_true", help="log warnings only")
 
 
-def rate(text: str) -> float:
-    """Hz; 0 for none. Raises ArgumentTypeError, like the functions below."""
-    with contextlib.suppress(ValueError):
-        if 0 <= (hertz := float(text)) <= 1000:
-            return hertz
-    raise argparse.ArgumentTypeError(f"{text!r} is not a rate; write a number of Hz up to 1000, 0 for none")
+def number(kind: Callable[[str], N], low: float, high: float, what: str) -> Callable[[str], N]:
+    """The type of an argument: a number from `low` to `high`. It raises ArgumentTypeError for another text."""
+
+    def read(text: str) -> N:
+        with contextlib.suppress(ValueError):
+            if low <= (found := kind(text)) <= high:
+                return found
+        raise argparse.ArgumentTypeError(f"{text!r} is not {what}")
+
+    return read
 
 
-def seconds(text: str) -> float:
-    """Seconds to listen, at most an hour."""
-    with contextlib.suppress(ValueError):
-        if 0 < (duration := float(text)) <= 3600:
-            return duration
-    raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 3600")
-
-
-def gap(text: str) -> float:
-    """Seconds of silence in a log."""
-    with contextlib.suppress(ValueError):
-        if 0 <= (silence := float(text)) <= 86400:
-            return silence
-    raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write a number of seconds up to 86400")
-
-
-def system(text: str) -> int:
-    """A MAVLink system id, 1 to 255."""
-    return _number(text, "a system id", 255)
+rate: Final = number(float, 0, 1000, "a rate; write a number of Hz up to 1000, 0 for none")
+seconds: Final = number(float, 1e-9, 3600, "a duration; write a number of seconds up to 3600")
+gap: Final = number(float, 0, 86400, "a duration; write a number of seconds up to 86400")
+system: Final = number(int, 1, 255, "a system id; write a number from 1 to 255")
+baud: Final = number(int, 1, 99_999_999, "a baud rate; write a number from 1 to 99999999")
 
 
 def named(text: str) -> tuple[tuple[int, int | None], str]:
@@ -197,15 +163,3 @@ def named(text: str) -> tuple[tuple[int, int | None], str]:
     if not is_vehicle_name(found[3]):
         raise argparse.ArgumentTypeError(f"{text!r}: a name has 1 to {LONGEST_NAME} printable characters")
     return (int(found[1]), None if found[2] is None else int(found[2])), found[3]
-
-
-def baud(text: str) -> int:
-    """Bits per second."""
-    return _number(text, "a baud rate", 99_999_999)
-
-
-def _number(text: str, what: str, most: int) -> int:
-    with contextlib.suppress(ValueError):
-        if 1 <= (number := int(text)) <= most:
-            return number
-    raise argparse.ArgumentTypeError(f"{text!r} is not {what}; write a number from 1 to {most}")

@@ -17,7 +17,7 @@ from ..links.url import parse
 from ..publishers.json_lines import JsonOptions
 from . import PROGRAM
 from .arms import with_arms
-from .options import WITH_ARGUMENTS, given, options_of, value_of
+from .options import WITH_ARGUMENTS, given, value_of
 
 log = logging.getLogger(__name__)
 
@@ -100,10 +100,7 @@ def with_publisher(
 
     The first flag of its options enables it. Raises UsageError if another of its flags is given without the first.
     """
-    enables = WITH_ARGUMENTS[kind][0][0].strip("-").replace("-", "_")
-    if not hasattr(options, enables):  # none of its arguments is there
-        return controllers
-    declaration = options_of(kind)
+    declaration = WITH_ARGUMENTS[kind]
     first, *others = (one.option for one in declaration.declared() if one.option.flag is not None)
     asked = given(options, declaration)
     if value_of(options, str(first.flag)) is not None:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
-from typing import TYPE_CHECKING
 
+from ..config import Config
 from ..errors import LinkError, UsageError
 from ..links.url import parse
 from ..streams import say
 from .options import FORMS, ConnectionHelp, baud, seconds, system, verbosity
 from .overrides import configured
-
-if TYPE_CHECKING:
-    import argparse
-
-    from ..config import Config
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

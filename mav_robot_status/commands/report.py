@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import logging
 import os
 import sys
-from typing import TYPE_CHECKING
 
+from ..config import Config
 from ..errors import NothingHeardError
 from ..streams import say
 from ..version import __version__
+from ..views.timeline import Timeline
 from . import PROGRAM
 from .options import names, px4_events, system, verbosity
 from .overrides import loaded, only
-
-if TYPE_CHECKING:
-    import argparse
-
-    from ..config import Config
-    from ..views.timeline import Timeline
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
-from typing import TYPE_CHECKING
 
+from ..config import Config
 from ..errors import UsageError
 from ..links.url import parse
 from ..publishers.json_lines import JsonOptions
-from . import PROGRAM, importing
+from . import PROGRAM
 from .options import (
     arms,
     baud,
@@ -24,11 +25,6 @@ from .options import (
     verbosity,
 )
 from .overrides import configured
-
-if TYPE_CHECKING:
-    import argparse
-
-    from ..config import Config
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,8 +60,7 @@ def run(options: argparse.Namespace) -> int:
         _check_live(options)
         return _live(config, options)
     _check_replay(config, options, log)
-    with importing():
-        from ..gateway.replay import replay
+    from ..gateway.replay import replay
 
     replay(config, log, sys.stdout, raw=options.raw)
     return 0
@@ -78,11 +73,10 @@ def _log(config: Config) -> str | None:
 
 
 def _live(config: Config, options: argparse.Namespace) -> int:
-    with importing():
-        from ..gateway.event_loop import EventLoop
-        from ..gateway.systemd import SystemdNotifier
+    from ..gateway.event_loop import EventLoop
+    from ..gateway.systemd import SystemdNotifier
 
-        gateway = EventLoop(config, sys.stdout, notifier=SystemdNotifier())
+    gateway = EventLoop(config, sys.stdout, notifier=SystemdNotifier())
     gateway.stop_on_signals()
     if options.config:
         gateway.reload_on_hangup(lambda: _again(options))

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import argparse
 
 from ..errors import UsageError
 from ..links.url import parse
 from . import PROGRAM
 from .options import connections, looking
 from .overrides import configured
-
-if TYPE_CHECKING:
-    import argparse
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import os
 from stat import S_ISDIR, S_ISFIFO, S_ISREG
-from typing import Final, NoReturn
+from typing import Final, NamedTuple, NoReturn
 
 import yaml
 
 from ..errors import ConfigError
-from ..values import NamedTuple
 
 MAX_BYTES: Final = 1_000_000
 MAX_DEPTH: Final = 20

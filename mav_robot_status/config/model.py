@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Annotated, Final, Literal
 
 from ..hardware.group import RULES, Rule
 from ..hardware.mavlink.options import HardwareOptions, OneOf, Or, Within
 from ..interface import DEFAULT_HANDLE_NAME
-from ..values import dataclass
 
 Id = Within(1, 255)
 VehicleName = Annotated[str, "name of a vehicle"]

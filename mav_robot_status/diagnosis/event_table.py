@@ -7,24 +7,21 @@ from __future__ import annotations
 
 import dataclasses
 import lzma
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
+from ..clock import Instant
 from ..clock import now as present
+from ..config import Config
 from ..errors import MavRobotStatusError, NothingHeardError
 from ..gateway.event_loop import EventLoop
+from ..gateway.mavlink_hardware import MavlinkHardware
 from ..hardware.mavlink.autopilots.wanted import METADATA
 from ..hardware.mavlink.px4_events.parsing import MOST_UNPACKED
+from ..hardware.mavlink.state.vehicle_state import VehicleState
 from ..mavlink.ftp import metadata
 from ..streams import NO_OUTPUT
 from .explain import silent
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..clock import Instant
-    from ..config import Config
-    from ..gateway.mavlink_hardware import MavlinkHardware
-    from ..hardware.mavlink.state.vehicle_state import VehicleState
 
 HEARD_BY: Final = 15.0  # s to wait for the first heartbeat
 KNOWN_BY: Final = 5.0

@@ -6,32 +6,27 @@ import dataclasses
 import json
 import logging
 import re
+from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, Final
+from typing import Final, TextIO
 
 from ..clock import Instant, later, rfc3339
 from ..clock import now as present
+from ..config import Config
 from ..errors import UsageError
 from ..gateway.controller_config import DEFAULT_CONTROLLER
 from ..gateway.event_loop import EventLoop
-from ..gateway.recorded_log import Recording
+from ..gateway.logs.recorded_log import Recording
 from ..gateway.replay import ReplayPipeline, run_through
+from ..hardware.mavlink.interface import MavlinkRobotHW
 from ..hardware.mavlink.senders import Sender, senders
-from ..interface import LinkState
+from ..interface import HardwareInterface, IndustrialRobotStatusHandle, LinkState
 from ..interface.explanation import explanation
+from ..json_object import JsonObject
 from ..language import remedy
+from ..links.log import Stamped
 from ..streams import NO_OUTPUT
-from . import applet, arming_checks
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-    from typing import TextIO
-
-    from ..config import Config
-    from ..hardware.mavlink.interface import MavlinkRobotHW
-    from ..interface import HardwareInterface, IndustrialRobotStatusHandle
-    from ..json_object import JsonObject
-    from ..links.log import Stamped
+from .vehicle_reports import PAGE, WORDS, applet_reports, arming_checks
 
 log = logging.getLogger(__name__)
 
@@ -131,9 +126,9 @@ def explanations(hw: HardwareInterface, vehicles: MavlinkRobotHW, now: Instant) 
     heard = list(filter(_is_heard, hw.handles))
     for handle in heard:
         hw.explain(handle.name, now)
-    reports = applet.reports(vehicles, now)
+    reports = applet_reports(vehicles, now)
     more: dict[str, JsonObject] = {name: {"applet": report} for name, report in reports.items()}
-    more |= {name: {"arming_checks": checks} for name, checks in arming_checks.reports(vehicles).items()}
+    more |= {name: {"arming_checks": checks} for name, checks in arming_checks(vehicles).items()}
     speak = {tracked.handle.name: senders(tracked.belief, now.mono) for tracked in vehicles.vehicles}
     return [
         explanation(handle, now)
@@ -215,8 +210,8 @@ def _member(cause: JsonObject) -> str:
 
 def _report(report: JsonObject | None) -> str:
     if report is None:
-        return f"not heard: {applet.PAGE}"
-    return f"RS_STOP {report['value']}, {applet.WORDS[report['value']]}, {report['age']:.1f} s ago"
+        return f"not heard: {PAGE}"
+    return f"RS_STOP {report['value']}, {WORDS[report['value']]}, {report['age']:.1f} s ago"
 
 
 def _said(text: str | None) -> str:

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol
 
+from ..clock import Instant
+from ..config import Config
+from ..gateway.logs.recorded_log import Recording
 from ..gateway.observer import Observer
-from ..gateway.recorded_log import Recording
 from ..gateway.replay import ReplayPipeline, run_through
-from ..interface import LinkState
+from ..interface import IndustrialRobotStatusHandle, IndustrialRobotStatusInterface, LinkState
+from ..links.log import Stamped
 from ..streams import NO_OUTPUT
 from .explain import silent
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-
-    from ..clock import Instant
-    from ..config import Config
-    from ..interface import IndustrialRobotStatusHandle, IndustrialRobotStatusInterface
-    from ..links.log import Stamped
 
 
 class Viewer(Protocol):

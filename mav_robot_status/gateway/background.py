@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import logging
 import threading
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import now as present
 from ..config import PublisherConfig
 from ..mavlink import definitions as mav
 from ..publishers.board import BoardPublisher
 from ..streams import NO_OUTPUT
-from ..values import NamedTuple
 from .controller_config import DEFAULT_CONTROLLER
 from .event_loop import EventLoop
 from .observer import Observer

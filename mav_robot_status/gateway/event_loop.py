@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ..clock import now as present
 from ..errors import MavRobotStatusError
-from .arrival import LATE, STALL
 from .controller_config import check
+from .links.arrival import LATE, STALL
 from .live_hardware import LiveHardware
 from .metrics import metrics
 from .pace import MOST_AT_ONCE, UNCOUNTED, Pace
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..clock import Instant
     from ..config import Config
     from ..interface import IoSource, Metrics
-    from .endpoint import Endpoint
+    from .links.endpoint import Endpoint
     from .observer import Observer
 
 log = logging.getLogger(__name__)
@@ -125,26 +125,22 @@ class EventLoop:
                     rest -= self._rest(now.mono, due)
                 # poll takes whole milliseconds: rounding down would make the loop spin until the due time
                 events = poll.poll(math.ceil(rest * 1000) if rest > 0 else 0)
-                before, now = now, self._clock()
+                now = self._clock()
                 if events:
-                    self._receive(events, before.mono, looked, now, wait)
+                    self._receive(events, looked, now, wait)
                 looked = now
         finally:
             self.close()
 
-    def _receive(
-        self, events: Sequence[tuple[int, int]], before: float, looked: Instant, now: Instant, wait: float
-    ) -> None:
-        """Read the sources that have input. The loop has waited since `before`; `looked` is its last look at them."""
-        limit = self._pace.limit(before, now.mono)
-        if now.mono - looked.mono > LATE:
-            limit = self._look_late(looked, now, wait)
+    def _receive(self, events: Sequence[tuple[int, int]], looked: Instant, now: Instant, wait: float) -> None:
+        """Read the sources that have input. `looked` is the last look at them."""
+        late = now.mono - looked.mono > LATE
+        limit = self._look_late(looked, now, wait) if late else MOST_AT_ONCE
         for descriptor, _ in events:
             source = self._polled.get(descriptor)
             if source is not None:
                 read = source.receive(now, limit)
-                if limit > 1 or read != 1:
-                    self._pace.count(UNCOUNTED if read is None else read, now.mono)
+                self._pace.count(UNCOUNTED if read is None else read, now.mono)
 
     def _look_late(self, looked: Instant, now: Instant, wait: float) -> int:
         """Tell the links that their input may be old. Returns how many datagrams to read.
@@ -152,7 +148,7 @@ class EventLoop:
         `looked` is the instant of the last look at the links, `wait` how many seconds the loop wanted to wait.
         """
         stalled = now.mono - looked.mono > max(wait, 0.0) + STALL
-        self.hardware.mavlink.hub.pause(looked, now, stalled=stalled)
+        self.hardware.mavlink.hub.receiver.pause(looked, now, stalled=stalled)
         return MOST_AFTER_PAUSE if stalled else MOST_AT_ONCE
 
     def turn(self, now: Instant) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
-from ..errors import ConfigError, MavRobotStatusError, UsageError
+from ..errors import ConfigError, UsageError
 from ..hardware.combined import CombinedRobotHW
 from ..hardware.group import Group
 from ..interface import HardwareContext
 from . import plugins
-from .guarded_hardware import GuardedHardware
+from .guards import as_config_error
+from .guards.hardware import GuardedHardware
 from .mavlink_hardware import MavlinkHardware
 
 if TYPE_CHECKING:
@@ -28,15 +29,11 @@ def open_interface(config: HardwareConfig, *, replay: bool = False, clock: Calla
     """Make a third party's hardware interface. Raises LinkError, and ConfigError with the place."""
     make = plugins.load(plugins.HARDWARE, config.type, config.where)
     context = HardwareContext(config.name, config.options, replay)
-    try:
-        return GuardedHardware(make(context), config.name, lambda: clock().mono)
-    except UsageError as error:
-        raise ConfigError(f"{config.where}: {error}") from None
-    except MavRobotStatusError:
-        raise
-    except Exception as error:
-        what = f"{config.where}: hardware interface '{config.name}' cannot be made"
-        raise ConfigError(f"{what}: {type(error).__name__}: {error}") from error
+    with as_config_error(f"{config.where}: hardware interface '{config.name}'"):
+        try:
+            return GuardedHardware(make(context), config.name, lambda: clock().mono)
+        except UsageError as error:
+            raise ConfigError(f"{config.where}: {error}") from None
 
 
 def combined(config: Config, first: HardwareInterface, others: Iterable[HardwareInterface]) -> HardwareInterface:

@@ -15,10 +15,10 @@ from ..hardware.mavlink.px4_events.parsing import parse
 from ..hardware.mavlink.vehicle import ExpectedVehicle
 from ..mavlink.commands import ROBOT_STATUS
 from .controller_config import publishes
-from .event_table_cache import EventTableCache, default_folder
-from .event_table_file import event_table
-from .event_tables import EventTables
-from .link_hub import LinkHub
+from .events.cache import EventTableCache, default_folder
+from .events.file import event_table
+from .events.tables import EventTables
+from .links.link_hub import LinkHub
 from .pace import MOST_AT_ONCE
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from ..hardware.mavlink.px4_events import EventTable
     from ..interface import IndustrialRobotStatusInterface, IoSource
     from ..mavlink.framing import Frame
-    from .channel import Channel
-    from .endpoint import Endpoint
+    from .links.channel import Channel
+    from .links.endpoint import Endpoint
     from .observer import Observer
 
 log = logging.getLogger(__name__)
@@ -70,17 +70,20 @@ class MavlinkHardware:
         """Open the links; with `opens` False only `open` does it. Raises LinkError, UsageError."""
         self._event_table = event_table(config)
         self.hub = LinkHub(config if opens else Config(), clock, observers)
-        self.vehicles = robot_hw(config, self.hub.beliefs, self._event_table)
+        self.vehicles = robot_hw(config, self.hub.members.beliefs, self._event_table)
         self.handles: IndustrialRobotStatusInterface = self.vehicles.handles
-        self.tables = EventTables(self.hub, self._use_table, parse, cache=EventTableCache(default_folder()))
+        self.tables = EventTables(
+            self.hub,
+            lambda ids, table: self.vehicles.use_event_table(ids, table),  # `renew` makes other vehicles
+            parse,
+            cache=EventTableCache(default_folder()),
+        )
         self.changed = False
         self.observers = observers
         self._waiting: list[tuple[Instant, Frame, Channel]] = []
         """Frames that arrived before they were read, with their times. The next `read` takes them in order."""
         self._read_at = -math.inf
         self._heartbeat_due = AT_ONCE
-        self._timer_due = AT_ONCE
-        """The first of `_heartbeat_due` and `_silent_at`."""
         self._silent_at = clock().mono + FIRST_SILENCE
         self._configure(config)
 
@@ -92,21 +95,16 @@ class MavlinkHardware:
     def _configure(self, config: Config) -> None:
         self._config = config
         self.vehicles.asks = config.requests == "missing" and not all(link.passive for link in config.links)
-        self._timer_due = AT_ONCE
         self._want_tables(config)
         if publishes(config, "mavlink"):
-            self.hub.offered |= {ROBOT_STATUS}
+            self.hub.receiver.commands.offered |= {ROBOT_STATUS}
         self._sources = tuple(LinkSource(endpoint, self) for endpoint in self.hub.endpoints)
 
     def _want_tables(self, config: Config) -> None:
         """Whether the tables of PX4's events are looked for, in the cache and on the vehicles."""
         self.tables.wanted = wants_tables(config)
         self.vehicles.ask_for_tables(self.tables.wanted)
-        self.vehicles.hear_file = self.tables.heard
-
-    def _use_table(self, ids: tuple[int, int], table: EventTable) -> None:
-        """A vehicle has this table of events."""
-        self.vehicles.use_event_table(ids, table)
+        self.vehicles.hear_file = self.tables.on_message
 
     # reload
 
@@ -121,13 +119,13 @@ class MavlinkHardware:
         # a waiting frame of a closed link would bring its vehicle back
         self._waiting = [one for one in self._waiting if one[2].endpoint in self.hub.endpoints]
         self._event_table = table
-        self.vehicles.forget(self.hub.vehicles())
+        self.vehicles.forget(self.hub.members.vehicles())
         self.vehicles.changed = True
         self._configure(config)
 
     def renew(self) -> None:
         """Use the vehicles and options of the new configuration. Vehicles in both configurations keep their state."""
-        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.beliefs, self._event_table)
+        before, self.vehicles = self.vehicles, robot_hw(self._config, self.hub.members.beliefs, self._event_table)
         self.vehicles.adopt(before)
         self.vehicles.asks = before.asks
         self._want_tables(self._config)
@@ -141,10 +139,10 @@ class MavlinkHardware:
 
     def receive_late(self, endpoint: Endpoint, now: Instant, limit: int) -> None:
         """Receive on a link whose input may be old."""
-        for at, heard in self.hub.receive_late(endpoint, now, limit):
-            self._waiting += [(at, frame, channel) for frame, channel in heard]
+        for at, received in self.hub.receiver.receive_late(endpoint, now, limit):
+            self._waiting += [(at, frame, channel) for frame, channel in received]
 
-    def _take_waiting(self) -> None:
+    def _process_waiting(self) -> None:
         """Process the frames of all links in the order of their arrival, as if they had been read at once.
 
         Time does not go back: a frame older than the last `read` is left out.
@@ -156,16 +154,17 @@ class MavlinkHardware:
                 continue
             if vehicles.deadline < at.mono:
                 vehicles.read(at)
-            vehicle = vehicles.take(frame, at, channel, self.hub.lag(frame))
-            if vehicle is not None and vehicle.ids is not None:
-                self.hub.heard_vehicle(vehicle.ids, channel, at.mono)
-            if self.observers:
-                self.observe([(frame, channel)], at)
+            self.process([(frame, channel)], at)
 
-    def observe(self, heard: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
-        """Pass the frames of vehicles to the observers."""
+    def process(self, received: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
+        """Process frames that arrived at `now`. The observers get those of vehicles."""
+        hub, take = self.hub, self.vehicles.take
+        for frame, channel in received:
+            vehicle = take(frame, now, channel, hub.receiver.lag(frame))
+            if vehicle is not None and vehicle.ids is not None:
+                hub.members.heard_vehicle(vehicle.ids, channel, now.mono)
         for observer in self.observers:
-            for frame, channel in heard:
+            for frame, channel in received:
                 vehicle = self.vehicles.find(*frame.ids)
                 if vehicle is not None and vehicle.belief.channel is channel:
                     observer.on_frame(frame, now)
@@ -175,9 +174,9 @@ class MavlinkHardware:
     def read(self, now: Instant) -> None:
         """Update the handles to `now`."""
         hub, vehicles = self.hub, self.vehicles
-        hub.needs_turn = False
+        hub.receiver.needs_turn = False
         if self._waiting:
-            self._take_waiting()
+            self._process_waiting()
         self._read_at = now.mono
         vehicles.read(now)
         if vehicles.changed:
@@ -185,8 +184,8 @@ class MavlinkHardware:
 
     def write(self, now: Instant) -> None:
         """Send the due requests and heartbeats."""
-        if self.vehicles.asks and (self.hub.has_passive or now.mono >= self.vehicles.requests_due):
-            for ask in self.vehicles.due_requests(now, self.hub.passive_vehicles(), self.hub.may_ask):
+        if self.vehicles.asks and (self.hub.members.has_passive or now.mono >= self.vehicles.requests_due):
+            for ask in self.vehicles.due_requests(now, self.hub.members.passive_vehicles(), self.hub.may_ask):
                 # the autopilot acknowledges to these ids
                 self.vehicles.speak_as(self._config.identity.system, self.hub.sender.component.id)
                 self.hub.ask(ask)
@@ -195,17 +194,12 @@ class MavlinkHardware:
                 self.hub.ask(ask)
         if self.hub.sender.signing_policy is not None:
             self.hub.sender.signing_policy.keep(now.mono)
-        if now.mono >= self._timer_due:
-            self._serve_timers(now.mono)
-
-    def _serve_timers(self, now: float) -> None:
-        if now >= self._heartbeat_due:
-            late = now - self._heartbeat_due > HEARTBEAT_PERIOD
-            self._heartbeat_due = (now if late else self._heartbeat_due) + HEARTBEAT_PERIOD
-            self.hub.speak(list(self.vehicles.vehicles), now)
-        if now >= self._silent_at:
-            self._log_silence(now)
-        self._timer_due = min(self._heartbeat_due, self._silent_at)
+        if now.mono >= self._heartbeat_due:
+            late = now.mono - self._heartbeat_due > HEARTBEAT_PERIOD
+            self._heartbeat_due = (now.mono if late else self._heartbeat_due) + HEARTBEAT_PERIOD
+            self.hub.speak(self.vehicles.vehicles, now.mono)
+        if now.mono >= self._silent_at:
+            self._log_silence(now.mono)
 
     def _log_silence(self, now: float) -> None:
         if any(self.vehicles.vehicles):
@@ -216,12 +210,10 @@ class MavlinkHardware:
 
     def next_due(self, until: float = -math.inf) -> float:
         """When there is something to do. At once (-inf) after a frame that may change a status."""
-        if self.hub.needs_turn:
+        if self.hub.receiver.needs_turn:
             return AT_ONCE
-        # compared without `min`: asked after each wake-up
-        timer = self._timer_due if self._timer_due < self.tables.next_due else self.tables.next_due
-        due = self.vehicles.next_due(until if until < timer else timer)
-        return due if due < timer else timer
+        timer = min(self._heartbeat_due, self._silent_at, self.tables.next_due)
+        return min(self.vehicles.next_due(min(until, timer)), timer)
 
     def explain(self, handle: str, now: Instant) -> None:
         """Update the evidence in this handle to `now`."""
@@ -259,31 +251,18 @@ class LinkSource:
 
     def receive(self, now: Instant, limit: int) -> int:
         """Read the pending input, and process its frames. Returns the number of datagrams."""
-        hub = self._hub
-        if hub.late:
+        receiver = self._hub.receiver
+        if receiver.late:
             self._hardware.receive_late(self._endpoint, now, limit)
             return MOST_AT_ONCE
-        if limit == 1 and hub.is_plain:
-            heard = hub.receive_one(self._endpoint, now)
-        else:
-            heard = hub.receive(self._endpoint, now, limit)
-        if heard:
-            self._take(heard, now)
-        return hub.pieces
-
-    def _take(self, heard: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
-        hardware = self._hardware
-        if self._endpoint.connections != self._connections:
-            self._connections = self._endpoint.connections
-            hardware.vehicles.reconnected(self._hub.vehicles_on(self._endpoint), now.mono)
-            self._hub.reconnected(self._endpoint)
-        take, lag = hardware.vehicles.take, self._hub.lag
-        for frame, channel in heard:
-            vehicle = take(frame, now, channel, lag(frame))
-            if vehicle is not None and vehicle.ids is not None:
-                self._hub.heard_vehicle(vehicle.ids, channel, now.mono)
-        if hardware.observers:
-            hardware.observe(heard, now)
+        received, number = receiver.receive(self._endpoint, now, limit)
+        if received:
+            if self._endpoint.connections != self._connections:
+                self._connections = self._endpoint.connections
+                self._hardware.vehicles.reconnected(self._hub.members.vehicles_on(self._endpoint), now.mono)
+                self._hub.members.reconnected(self._endpoint)
+            self._hardware.process(received, now)
+        return number
 
     def service(self, now: Instant) -> None:
         """Connect or reconnect."""

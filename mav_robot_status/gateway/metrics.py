@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..interface import IndustrialRobotStatusHandle
-    from .endpoint import Endpoint
-    from .link_hub import LinkHub
+    from .links.endpoint import Endpoint
+    from .links.link_hub import LinkHub
     from .pipeline import Pipeline
 
 
@@ -46,8 +46,8 @@ def _connection(endpoint: Endpoint) -> ConnectionMetrics:
         got.incompatible,
         got.garbage_bytes,
         endpoint.link.dropped,
-        endpoint.speech.said,
-        endpoint.speech.withheld,
+        endpoint.budget.sent,
+        endpoint.budget.withheld,
         endpoint.left_out,
     )
 

@@ -20,11 +20,6 @@ EMPTIED: Final = BURST / RATE
 """Seconds until a bucket with one piece is empty; the same for a full bucket."""
 UNCOUNTED: Final = round(RATE * PACE)
 """A source that does not count its pieces is paced if it wakes the process more than 500 times a second."""
-ALONE: Final = 0.0003
-"""Seconds without input after which a piece has probably arrived alone. Then one is read: the second system call, which
-finds nothing, costs a quarter of a wake-up."""
-MOST_ALONE: Final = 16
-"""Looks at a single piece in succession. The next look reads everything, so that nothing ever stays behind."""
 MOST_AT_ONCE: Final = 1024
 """Datagrams of usual length read in one wake-up of each link; bounded, so that a flood does not stop the rest."""
 
@@ -32,28 +27,13 @@ MOST_AT_ONCE: Final = 1024
 class Pace:
     """A bucket that holds BURST pieces and empties at RATE. Times are monotonic seconds."""
 
-    __slots__ = ("_alone", "_most_alone", "gather", "rests_until")
+    __slots__ = ("gather", "rests_until")
 
     def __init__(self, gather: float = 0.0) -> None:
         """`gather`: seconds for which input always gathers, see `coalesce` of the configuration."""
         self.gather = gather
         self.rests_until = -math.inf
         """The loop does not look before this time."""
-        self._alone = self._most_alone = 0 if gather else MOST_ALONE
-
-    def limit(self, before: float, now: float) -> int:
-        """How many datagrams to read at `now`, after the loop has waited for input since `before`, rests included.
-
-        If this returns 1, that datagram is already counted.
-        """
-        full = self.rests_until
-        if now - before > ALONE and before >= full and self._alone:
-            self._alone -= 1
-            empty = now - EMPTIED
-            self.rests_until = (full if full > empty else empty) + EACH
-            return 1
-        self._alone = self._most_alone
-        return MOST_AT_ONCE
 
     def count(self, pieces: int, now: float) -> None:
         """Note that so many pieces were read at `now`."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from itertools import count
 from operator import attrgetter
 from typing import TYPE_CHECKING, Final, TextIO
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Final, TextIO
 from ..clock import Instant
 from ..controller import IndustrialRobotStatusController
 from ..due_times import DueTimes
-from ..errors import ConfigError, MavRobotStatusError
 from ..interface import (
     Detail,
     Inhibit,
@@ -39,13 +38,13 @@ from .controller_config import (
     publisher_key,
     publishers_of,
 )
-from .guarded_controller import GuardedController
-from .guarded_publisher import GuardedPublisher
-from .single_handle import SingleHandles
-from .unread_handles import UnreadHandles
+from .guards import as_config_error
+from .guards.controller import GuardedController
+from .guards.publisher import GuardedPublisher
+from .handles import SingleHandles, UnreadHandles
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from ..config import Config, ControllerConfig, PublisherConfig
     from ..interface import HardwareInterface, IndustrialRobotStatusHandle, MavlinkPort, Metrics, Publisher
@@ -285,7 +284,7 @@ class Pipeline:
         served = [p for p in publishers_of(config) if self._single_handles.serves(p, config)]
         self._served |= {(publisher_key(p), handle_name(config)) for p in served}
         publishers = self._publishers(served, config.where)
-        with _as_config_error(f"{config.where}: controller '{config.name}'"):
+        with as_config_error(f"{config.where}: controller '{config.name}'"):
             controller = make()
             controller.init(self._interfaces, config.parameters, publishers)
             self._controllers.append(GuardedController(config.name, controller, controller.handle, next(self._numbers)))
@@ -302,7 +301,7 @@ class Pipeline:
         key = publisher_key(config)
         if key not in self.publishers:
             make: Callable[[PublisherContext], Publisher] = plugins.load(plugins.PUBLISHERS, config.type, where)
-            with _as_config_error(f"{where}: publisher '{config.type}'"):
+            with as_config_error(f"{where}: publisher '{config.type}'"):
                 made = make(self._context._replace(options=config.options))
             trusted = plugins.is_part_of_this_package(made)
             self.publishers[key] = made if trusted else GuardedPublisher(made, config.type)
@@ -311,14 +310,3 @@ class Pipeline:
 
 def _keep(handle: str) -> None:
     """A publisher that keeps nothing for a handle has nothing to forget."""
-
-
-@contextmanager
-def _as_config_error(what: str) -> Iterator[None]:
-    """Raise ConfigError for every exception of a third party's constructor."""
-    try:
-        yield
-    except MavRobotStatusError:
-        raise
-    except Exception as error:
-        raise ConfigError(f"{what} cannot be made: {type(error).__name__}: {error}") from error

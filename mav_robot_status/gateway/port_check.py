@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..errors import UsageError
 from ..links.url import parse
-from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

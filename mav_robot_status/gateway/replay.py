@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from ..clock import later
 from ..interface import LinkState
 from .live_hardware import combined, open_interface
+from .logs.recorded_log import Recording
 from .mavlink_hardware import robot_hw
 from .pipeline import NEVER, Pipeline
-from .recorded_log import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterable, Sequence

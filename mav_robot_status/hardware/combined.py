@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
 
-from ..interface import Detail, IndustrialRobotStatusHandle, LinkState, RobotHW
-from .group import combine, last_heard, member_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..clock import Instant
-    from ..interface import HardwareInterface, IoSource
-    from .group import Group
+from ..clock import Instant
+from ..interface import Detail, HardwareInterface, IndustrialRobotStatusHandle, IoSource, LinkState, RobotHW
+from .group import Group, combine, last_heard, member_of
 
 log = logging.getLogger(__name__)
 

@@ -6,12 +6,15 @@ whose link is lost is UNKNOWN in every field, and so counts as UNKNOWN.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
 
 from ..interface import (
     STATES,
     Detail,
+    ErrorCause,
     Evidence,
+    IndustrialRobotStatusHandle,
     Inhibit,
     LinkState,
     RobotMode,
@@ -19,13 +22,7 @@ from ..interface import (
     TriState,
     Vehicle,
 )
-from ..values import NamedTuple
 from .join import Logic, join
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from ..interface import ErrorCause, IndustrialRobotStatusHandle
 
 GROUP: Final = "GROUP"
 """`vehicle.type` of a group."""

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import Enum
-from typing import TYPE_CHECKING
 
 from ..interface import TriState
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 
 class Logic(Enum):

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
+from ..clock import Instant
 from ..links.tcp import TcpLink
 from ..links.url import parse
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..clock import Instant
 
 log = logging.getLogger(__name__)
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from ..clock import Instant
-    from .handle import IndustrialRobotStatusHandle
-    from .publisher import Publisher
-    from .registry import InterfaceManager
+from ..clock import Instant
+from .handle import IndustrialRobotStatusHandle
+from .publisher import Publisher
+from .registry import InterfaceManager
 
 
 class Controller(Protocol):

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from ..clock import rfc3339
-from .fields import STATES
-
-if TYPE_CHECKING:
-    from ..clock import Instant
-    from ..json_object import JsonObject
-    from .fields import Field
-    from .handle import IndustrialRobotStatusHandle
+from ..clock import Instant, rfc3339
+from ..json_object import JsonObject
+from .fields import STATES, Field
+from .handle import IndustrialRobotStatusHandle
 
 
 def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> JsonObject:

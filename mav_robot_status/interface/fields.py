@@ -10,9 +10,7 @@ Numbers are those of industrial_msgs: TriState -1/0/1, RobotMode -1/1/2 (0 is no
 from __future__ import annotations
 
 from enum import Enum, IntEnum
-from typing import Annotated, Final, get_args, get_type_hints
-
-from mav_robot_status.values import NamedTuple
+from typing import Annotated, Final, NamedTuple, get_args, get_type_hints
 
 
 class TriState(IntEnum):

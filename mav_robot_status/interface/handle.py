@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
-from .status import Detail, RobotStatus
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from .status import Evidence
+from .status import Detail, Evidence, RobotStatus
 
 DEFAULT_HANDLE_NAME = "industrial_robot_status_handle"
 

@@ -8,18 +8,13 @@ robot into the handles, update the controllers, `write` to the robot.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
 
-from ..values import NamedTuple
+from ..clock import Instant
+from .handle import IndustrialRobotStatusHandle
 from .registry import IndustrialRobotStatusInterface, InterfaceManager
-from .status import Detail, RobotStatus
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from ..clock import Instant
-    from .handle import IndustrialRobotStatusHandle
-    from .status import Evidence
+from .status import Detail, Evidence, RobotStatus
 
 
 class IoSource(Protocol):

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import NamedTuple
 
-from mav_robot_status.values import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from .status import RobotStatusMsg
+from .status import RobotStatusMsg
 
 
 class ConnectionMetrics(NamedTuple):

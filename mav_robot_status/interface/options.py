@@ -14,14 +14,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from ..errors import UsageError
-from ..values import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
 
 O = TypeVar("O", bound="Options")  # noqa: E741
 
@@ -57,10 +54,8 @@ class Options:
     @classmethod
     def declared(cls) -> tuple[Declared, ...]:
         """Every option, in the order of the fields."""
-        if cls not in _DECLARED:
-            hints = get_type_hints(cls, include_extras=True)
-            _DECLARED[cls] = tuple(_declared(field, hints[field.name]) for field in dataclasses.fields(cls))
-        return _DECLARED[cls]
+        hints = get_type_hints(cls, include_extras=True)
+        return tuple(_declared(field, hints[field.name]) for field in dataclasses.fields(cls))
 
     @classmethod
     def read(cls: type[O], publisher: str, given: Mapping[str, object]) -> O:
@@ -88,10 +83,6 @@ def short(value: object, most: int = 60) -> str:
     """A user's value for a message: in quotes if it is a text, and cut to `most` characters."""
     shown = repr(value)
     return shown if len(shown) <= most else f"{shown[: most - 4]}...{shown[-1]}"
-
-
-_DECLARED: dict[type, tuple[Declared, ...]] = {}
-"""What each class declares. The command line asks several times."""
 
 
 def _declared(field: dataclasses.Field[Any], hint: Any) -> Declared:

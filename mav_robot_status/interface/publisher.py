@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, TextIO
+from collections.abc import Callable, Collection, Container, Hashable, Mapping, Sequence
+from typing import NamedTuple, Protocol, TextIO
 
-from ..values import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Container, Hashable, Mapping, Sequence
-
-    from ..clock import Instant
-    from ..json_object import JsonMapping
-    from .metrics import Metrics
-    from .status import RobotStatusMsg
+from ..clock import Instant
+from ..json_object import JsonMapping
+from .metrics import Metrics
+from .status import RobotStatusMsg
 
 
 class Publisher(Protocol):
     """One output. No method blocks: a publisher that cannot accept a message is `busy`, and is tried again soon.
+
+    A class may derive from this one: then it is never busy, and has nothing to do in `service` and `close`.
 
     A publisher may have two more methods:
 
@@ -42,6 +40,7 @@ class Publisher(Protocol):
 
     def busy(self) -> bool:
         """True while it cannot accept a message (a failed trylock of realtime_tools)."""
+        return False
 
     def publish(self, msg: RobotStatusMsg) -> None:
         """Accept a message. Only called while not busy."""
@@ -49,9 +48,11 @@ class Publisher(Protocol):
     def service(self, now: Instant) -> float | None:
         """Do pending work: the rest of a line, a change that was held back. Return when to be called again (monotonic
         seconds), or None if nothing waits."""
+        return None
 
     def close(self) -> None:
         """The last call: send the remaining messages and release all resources. A second call does nothing."""
+        return  # so that a class need not have it
 
 
 class Audience(NamedTuple):

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from ..errors import MavRobotStatusError, UnknownHandleError
-
-if TYPE_CHECKING:
-    from .handle import IndustrialRobotStatusHandle
+from .handle import IndustrialRobotStatusHandle
 
 log = logging.getLogger(__name__)
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..clock import rfc3339
 from ..json_object import JsonObject
-from ..values import NamedTuple
 from .fields import RobotMode, RobotStatus, TriState
 
 __all__ = [

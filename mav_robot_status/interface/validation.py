@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
 from .fields import FIELDS, STATES, Kind, RobotMode, RobotStatus, TriState
 from .status import Detail, ErrorCause, Inhibit, LinkState, Vehicle
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 CODES: Final = range(-(2**31), 2**31)
 """ROBOT_STATUS and industrial_msgs carry a code as int32."""

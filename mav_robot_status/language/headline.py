@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime, timedelta
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..json_object import JsonMapping
-from ..values import NamedTuple
 from .remedies import remedy
 from .states import (
     ARMED,

@@ -5,10 +5,9 @@ A step never says that something is safe, and never turns a check off. It holds 
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..json_object import JsonMapping
-from ..values import NamedTuple
 from .texts import step_for
 
 

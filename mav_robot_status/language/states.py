@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..json_object import JsonMapping
-from ..values import NamedTuple
 from .remedies import INITIALS, SENSOR_ROWS, WORDS_DECIDE, remedy, spoken
 from .values import Tone
 

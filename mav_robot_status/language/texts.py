@@ -7,9 +7,7 @@ documentation) and of PX4's arming checks (src/modules/commander/HealthAndArming
 from __future__ import annotations
 
 import re
-from typing import Final
-
-from ..values import NamedTuple
+from typing import Final, NamedTuple
 
 MOST: Final = 500
 """Characters of a text that are searched. A text comes from the wire."""

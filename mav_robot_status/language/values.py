@@ -6,10 +6,9 @@ it is stopped or in error (alarm), nobody knows (unknown). The shape and the wor
 
 from __future__ import annotations
 
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 from ..interface import STATES, Field, Kind
-from ..values import NamedTuple
 
 Tone = Literal["calm", "active", "warning", "alarm", "unknown"]
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Protocol, runtime_checkable
-
-from mav_robot_status.values import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 Address = Hashable
 """The source of received bytes. Each connection of a stream has an address of its own, so that the bytes of two

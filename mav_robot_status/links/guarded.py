@@ -5,18 +5,15 @@ from __future__ import annotations
 import logging
 import math
 import random
+from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import Final, TypeVar
 
 from mav_robot_status.errors import LinkError, MavRobotStatusError
 from mav_robot_status.links.base import Address, Link, Received
+from mav_robot_status.links.kind import Url
 from mav_robot_status.links.kinds import KINDS
 from mav_robot_status.links.retry import Backoff, RandomFraction, StateLog
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from mav_robot_status.links.kind import Url
 
 log = logging.getLogger(__name__)
 

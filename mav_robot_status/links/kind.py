@@ -9,15 +9,11 @@ A package adds a kind with an entry point. Its name is the scheme, its value is 
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import NamedTuple
 
 from mav_robot_status.errors import LinkError
-from mav_robot_status.values import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from mav_robot_status.links.base import Link
+from mav_robot_status.links.base import Link
 
 
 class Url(NamedTuple):

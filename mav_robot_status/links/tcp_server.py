@@ -12,7 +12,7 @@ import socket
 import time
 from collections import Counter
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from mav_robot_status.links.base import STAYS, Address, Received
 from mav_robot_status.links.listen import LocalPort
@@ -22,7 +22,6 @@ from mav_robot_status.links.stream import Stream, reason
 from mav_robot_status.links.tcp import tuned
 from mav_robot_status.links.url import Url, host_port
 from mav_robot_status.paced_log import BURST, PacedLog
-from mav_robot_status.values import NamedTuple
 
 log = logging.getLogger(__name__)
 

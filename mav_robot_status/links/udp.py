@@ -10,8 +10,9 @@ import random
 import socket
 import struct
 import time
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from mav_robot_status.errors import LinkError
 from mav_robot_status.links.base import Address, Dated, Received
@@ -21,9 +22,6 @@ from mav_robot_status.links.retry import Backoff, RandomFraction, StateLog
 from mav_robot_status.links.senders import Senders
 from mav_robot_status.links.url import Url, host_port
 from mav_robot_status.paced_log import BURST, PacedLog
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 log = logging.getLogger(__name__)
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 import re
 import stat
-from typing import NoReturn
+from typing import Final, NoReturn
 
 from mav_robot_status.errors import UsageError
 from mav_robot_status.links import kinds
-from mav_robot_status.links.foreign import WORDS, what_it_is
 from mav_robot_status.links.forms import ADDRESS, BARE_HOST_PORT, DEVICE_BAUD, FROM, refuse_from
 from mav_robot_status.links.kind import Url, host_port
 from mav_robot_status.links.kinds import BY_SCHEME, KINDS, LOG, SERIAL, UDP_LISTENER, UDP_SENDER
@@ -21,6 +20,36 @@ _PORT_ALONE = re.compile(r":[0-9]+", re.ASCII)
 _GLUED = re.compile(r"([A-Za-z]+)([0-9]+(?:\.[0-9]+){3})", re.ASCII)
 NEARLY = 0.86
 """A host that is more similar to a scheme than this (1: equal) is taken for a misspelt scheme."""
+_BEHIND: Final = re.compile(r"[A-Za-z][\w+-]*:(?://)?(.*?)/?", re.ASCII | re.DOTALL)
+_PLACE: Final = re.compile(r"(?:\[[0-9A-Fa-f:.]+\]|[\w.-]*):[0-9]+", re.ASCII)
+
+_MAVROS: Final = "is MAVROS's form"
+_BROKER: Final = "is an MQTT broker, which is an output; write --mqtt {text}"
+_WEB: Final = "is a web address, not a source of MAVLink; to serve a web page write --http 127.0.0.1:8765"
+_ROS2: Final = "is an output for ROS 2; write --ros2 {text}"
+_ARM: Final = "is an arm, not a source of MAVLink; write --arm {text}"
+_FILE: Final = "is a file; write its path alone: {rest}"
+
+FOREIGN: Final = {
+    "tcp-l": f"{_MAVROS}; write tcpin:{{place}}",
+    "udp-b": f"{_MAVROS}; write udpbcast:192.168.1.255:14550",
+    "udp-pb": f"{_MAVROS}; write udpbcast:192.168.1.255:14550",
+    "serial-hwfc": f"{_MAVROS}, and flow control is not used; write serial:{{rest}}",
+    "mqtt": _BROKER,
+    "mqtts": _BROKER,
+    "http": _WEB,
+    "https": _WEB,
+    "ws": _WEB,
+    "wss": _WEB,
+    "zenoh": _ROS2,
+    "dds": _ROS2,
+    "ur": _ARM,
+    "simple_message": _ARM,
+    "file": _FILE,
+    "tlogreader": _FILE,
+}
+"""Texts that people know from elsewhere and that are not connections, by scheme: what each is, and what to write.
+`place` is the HOST:PORT after the scheme, or an example; `rest` is everything after the scheme."""
 _EXAMPLES = ", ".join(kind.example for kind in (UDP_LISTENER, SERIAL, LOG))
 
 
@@ -38,10 +67,10 @@ def parse(text: str, baud: int | None = None) -> Url:
     found = _SCHEME.fullmatch(text)
     scheme, rest = (found[1].lower(), found[2]) if found else ("", text)
     kind = BY_SCHEME.get(scheme)
-    if kind is None and scheme in WORDS and not (os.path.exists(text) or BARE_HOST_PORT.fullmatch(text)):
+    if kind is None and scheme in FOREIGN and not (os.path.exists(text) or BARE_HOST_PORT.fullmatch(text)):
         kind = kinds.installed(scheme)
         if kind is None:
-            raise UsageError(what_it_is(text, scheme))
+            raise UsageError(_what_it_is(text, scheme))
     if kind is None:
         if os.path.isfile(text) or text.lower().endswith(".tlog"):
             return LOG.url(text, text, baud)
@@ -104,3 +133,11 @@ def _is_device(text: str) -> bool:
         return stat.S_ISCHR(os.stat(DEVICE_BAUD.fullmatch(text)[1]).st_mode)  # type: ignore[index]  # matches any text
     except (OSError, ValueError):
         return False
+
+
+def _what_it_is(text: str, scheme: str) -> str:
+    """What a text with a scheme of the table is, and what to write."""
+    found = _BEHIND.fullmatch(text)
+    rest = found[1] if found else ""
+    place = rest if _PLACE.fullmatch(rest) else "0.0.0.0:5760"
+    return f"{text!r} {FOREIGN[scheme].format(text=text, rest=rest, place=place)}"

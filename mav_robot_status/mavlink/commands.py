@@ -8,23 +8,17 @@ message that we do not send, UNSUPPORTED for an unknown command.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
-
-from mav_robot_status.values import NamedTuple
+from collections.abc import Callable, Container
+from typing import Final, NamedTuple
 
 from . import enumerations
-from .definitions import CommandAck, MessageInterval
+from .definitions import CommandAck, CommandInt, CommandLong, MessageInterval
 from .enumerations import MAV_CMD_GET_MESSAGE_INTERVAL as GET_MESSAGE_INTERVAL
 from .enumerations import MAV_CMD_REQUEST_MESSAGE as REQUEST_MESSAGE
 from .enumerations import MAV_CMD_SET_MESSAGE_INTERVAL as SET_MESSAGE_INTERVAL
 from .enumerations import MAV_RESULT_ACCEPTED as ACCEPTED
 from .enumerations import MAV_RESULT_DENIED as DENIED
 from .enumerations import MAV_RESULT_UNSUPPORTED as UNSUPPORTED
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Container
-
-    from .definitions import CommandInt, CommandLong
 
 HEARTBEAT, MESSAGE_INTERVAL = enumerations.MAVLINK_MSG_ID_HEARTBEAT, enumerations.MAVLINK_MSG_ID_MESSAGE_INTERVAL
 ROBOT_STATUS: Final = enumerations.MAVLINK_MSG_ID_ROBOT_STATUS

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Final
-
-from ..values import dataclass
 
 MAX_IDS: Final = 256
 """The most ids with a separate counter in each table of `Counters`."""

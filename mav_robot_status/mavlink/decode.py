@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from typing import Any, Final
 
 from .definitions import MESSAGES
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 
 Reader = tuple[type, int, "Callable[..., tuple[Any, ...]]"]
 """The reader of one message: its type, the bytes up to the last known field, and the function that unpacks the known

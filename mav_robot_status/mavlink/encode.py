@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import struct
 from binascii import crc_hqx
-from typing import TYPE_CHECKING, Final
-
-from mav_robot_status.values import NamedTuple
+from collections.abc import Callable
+from typing import Final, NamedTuple
 
 from .definitions import CRC_EXTRA, MESSAGES
 from .wire import REVERSED, V1, V2
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 HEADER_V1: Final = struct.Struct("<BBBBBB").pack
 HEADER_V2: Final = struct.Struct("<BBBBBBBHB").pack

@@ -14,20 +14,16 @@ from __future__ import annotations
 
 import struct
 from binascii import crc_hqx
-from typing import TYPE_CHECKING, Any, Final
-
-from mav_robot_status.values import NamedTuple
+from collections.abc import Collection, Sequence
+from typing import Any, Final, NamedTuple
 
 from .counters import Counters, count
+from .decode import Reader
 from .definitions import CRC_EXTRA
 from .wire import FORMATS, MAGIC, REVERSED, SIGNED, UNDO, UNKNOWN, V1, V2, known_ids
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
 MAX_SOURCES: Final = 1024
-"""The most (system, component) pairs that are checked for lost frames. A further one is checked only until another
-sends."""
+"""The most (system, component) pairs that are checked for lost frames. Further ones are not."""
 STAMP = struct.Struct(">Q").unpack_from  # precedes each frame of a recorded log: microseconds since 1970
 STAMP_SIZE: Final = 8
 LATE = 240  # a gap this long means a frame up to 16 places late, or a duplicate; not 240 lost frames
@@ -40,7 +36,7 @@ long, so frames of an unknown dialect are always skipped whole."""
 MOST_CREDIT, FIRST_CREDIT = 6144, 768
 """The most unspent bytes kept for later checks, and how many a new parser has. A damaged frame may consist of places
 at which a frame may start; all of them are checked. A new parser has fewer, because each new address gets a parser."""
-NEXT: Final[tuple[int, ...]] = (*range(1, 256), 0)  # by sequence number; a lookup is faster than the arithmetic
+TRAILER, SIGNED_TRAILER = 2, 15  # bytes after the payload: the CRC, and a signature
 VALID, WRONG = 0, -1
 new = tuple.__new__  # makes a NamedTuple from a tuple in a third of the time of its constructor
 
@@ -68,7 +64,7 @@ class Frame(NamedTuple):
 
 
 Values = tuple[int, tuple[int, int], int, Any, bytes, int]
-"""The values of a Frame in a plain tuple, which takes a third of the time to build and unpack."""
+"""What a Frame consists of. A Frame is such a tuple."""
 
 
 class Parser:
@@ -81,12 +77,9 @@ class Parser:
 
     __slots__ = (
         "_credit",
-        "_current",
         "_expected",
-        "_format",
         "_in_sync",
         "_known",
-        "_next_expected",
         "_open",
         "_searched",
         "_stamp_size",
@@ -105,10 +98,7 @@ class Parser:
         self._credit = FIRST_CREDIT  # unspent bytes at the start of `_tail`
         self._open: list[tuple[int, int]] = []  # out of sync: the places in `_tail` that are not decided, see `_search`
         self._searched = 0  # out of sync: the bytes of `_tail` that were searched
-        self._format = FORMATS[V2]  # of the last frame: most streams have only one version, and often one source
-        self._current = 0  # the last source: system | component << 8; 0.0 means none
-        self._next_expected: int | None = None  # the next sequence number of the last source
-        self._expected: dict[int, int | None] = {}  # by source; the entry of the last source may be out of date
+        self._expected: dict[int, int] = {}  # by source (system | component << 8): its next sequence number
         self._known = known_ids(frozenset(CRC_EXTRA if wanted is None else wanted))
 
     def want(self, ids: frozenset[int]) -> None:
@@ -129,120 +119,76 @@ class Parser:
 
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that these bytes complete, in order. Never raises; keeps at most MAX_FRAME bytes."""
-        found: list[Any] = self.walk(data)
-        return [new(Frame, values) for values in found] if found else found
-
-    def walk(self, data: bytes) -> list[Values]:
-        """The frames of `feed` as plain tuples.
-
-        One loop with local names: the speed of the gateway depends on these few hundred nanoseconds a frame.
-        """
         if self._tail:
             data = self._tail + data
-        size = len(data)
         reversed_data = data.translate(REVERSED)
-        version, unpack, header, seed = self._format
-        known = self._known[version]
-        current, next_expected, expected = self._current, self._next_expected, self._expected
-        ids = current & 255, current >> 8
-        frames: list[Values] = []
-        message: Any
-        good = since = old = 0
-        stamped = i = self._stamp_size
-        trailer, limit = 2 + stamped, size + stamped  # the CRC and the next stamp; where they may end
-        before = -1
-        if not self._in_sync:
-            i = self._resync(data, reversed_data, max(self._searched, min(stamped, size)), self._open)
-            if not self._in_sync:
-                rest = max(0, i - stamped)
-                self._tail = data[rest:]
-                self._credit += rest
-                return frames
-        try:
-            while i < size:
-                if data[i] != version:
-                    if data[i] not in FORMATS:
-                        i = self._resync(data, reversed_data, i)
-                        if self._in_sync:
-                            continue
-                        break
-                    if version == V1:
-                        old += good - since
-                    since = good
-                    self._format = version, unpack, header, seed = FORMATS[data[i]]
-                    known = self._known[version]
-                length, flags, sequence, source, wire_id = unpack(data, i)
-                end = i + header + length
-                following = end + trailer
-                if flags and flags & SIGNED:
-                    following += 13
-                if following > limit:
+        frames: list[Frame] = []
+        size, stamped = len(data), self._stamp_size
+        i = self._resume(data, reversed_data)
+        while self._in_sync and i < size:
+            if data[i] not in FORMATS:
+                i = self._resync(data, reversed_data, i)
+                continue
+            version, unpack, header, seed = FORMATS[data[i]]
+            start = i + header
+            if start > size:
+                break
+            length, flags, sequence, source, wire_id = unpack(data, i)
+            end = start + length
+            stop = end + (SIGNED_TRAILER if flags and flags & SIGNED else TRAILER)
+            if stop > size:
+                break
+            effect, message_id, reader = self._known[version].get(wire_id, UNKNOWN)
+            if crc_hqx(reversed_data[i:end], seed) ^ effect != UNDO[reversed_data[end + 1]] ^ reversed_data[end]:
+                unverified = i
+                i = self._skip_unverified(data, reversed_data, i, stop + stamped, sequence, source, wire_id)
+                if i == unverified:
                     break
-                try:
-                    effect, message_id, reader = known[wire_id]
-                except KeyError:
-                    effect, message_id, reader = UNKNOWN
-                if crc_hqx(reversed_data[i:end], seed) ^ effect != UNDO[reversed_data[end + 1]] ^ reversed_data[end]:
-                    if current in expected:
-                        expected[current] = next_expected
-                    unverified = i
-                    i = self._skip_unverified(data, reversed_data, i, following, sequence, source, wire_id)
-                    next_expected = expected.get(current)
-                    if self._in_sync and i > unverified:
-                        if effect < 0 and i == following:
-                            stamp = STAMP(data, unverified - stamped)[0] if stamped else 0
-                            frames.append(_unchecked(data, unverified, following - stamped, stamp))
-                        continue
-                    break
-                before = i
-                i = following
-                if source != current:
-                    if current in expected:
-                        expected[current] = next_expected
-                    next_expected = expected.get(source)
-                    if next_expected is None and len(expected) < MAX_SOURCES:
-                        expected[source] = None
-                    current, ids = source, (source & 255, source >> 8)
-                next_expected = NEXT[sequence] if sequence == next_expected else self._gap(next_expected, sequence)
-                if flags:
-                    if flags != SIGNED:
-                        self.counters.incompatible += 1
-                        continue
-                    self.counters.signed += 1
-                good += 1
-                if reader is None:
-                    message = None
-                else:
-                    kind, whole, fields = reader
-                    if length >= whole:
-                        message = new(kind, fields(data, end - length))
-                    else:
-                        message = new(kind, fields(data[end - length : end].ljust(whole, b"\0")))
-                stamp = STAMP(data, before - stamped)[0] if stamped else 0
-                frames.append((message_id, ids, sequence, message, data[before : i - stamped], stamp))
-        except struct.error:
-            pass  # the data ends within a header
-        self._current, self._next_expected = current, next_expected
-        rest = i - stamped
+                if effect < 0 and i == stop + stamped and self._in_sync:
+                    frames.append(_unchecked(data[unverified:stop], self._stamp(data, unverified)))
+                continue
+            self.last_stamp = stamp = self._stamp(data, i) if stamped else 0
+            if self._count(version, flags, sequence, source):
+                message = None if reader is None else _decoded(reader, data, start, end)
+                ids = source & 255, source >> 8
+                frames.append(new(Frame, (message_id, ids, sequence, message, data[i:stop], stamp)))
+            i = stop + stamped
+        rest = max(0, i - stamped)
         self._tail = data[rest:]
         self._credit += rest
-        if stamped and before >= 0:
-            (self.last_stamp,) = STAMP(data, before - stamped)
-        self.counters.frames += good
-        self.counters.frames_v1 += old + good - since if version == V1 else old
         return frames
 
-    def _gap(self, expected: int | None, sequence: int) -> int:
-        """Count the frames lost before this one; the first frame of a source only starts the count.
+    def _resume(self, data: bytes, reversed_data: bytes) -> int:
+        """The position at which the first frame is expected. Out of sync, that of the first valid one."""
+        if self._in_sync:
+            return self._stamp_size
+        searched = max(self._searched, min(self._stamp_size, len(data)))
+        return self._resync(data, reversed_data, searched, self._open)
 
-        Returns the sequence number of the next frame.
-        """
-        if expected is not None:
-            gap = (sequence - expected) & 255
-            if gap >= LATE:
-                return expected
-            self.counters.lost += gap
-        return NEXT[sequence]
+    def _stamp(self, data: bytes, i: int) -> int:
+        """The stamp of the frame at `i`; 0 without stamps."""
+        stamp: int = STAMP(data, i - STAMP_SIZE)[0] if self._stamp_size else 0
+        return stamp
+
+    def _count(self, version: int, flags: int | bytes, sequence: int, source: int) -> bool:
+        """Count a valid frame, and those lost before it. False for a frame with an unknown flag."""
+        counters = self.counters
+        expected = self._expected.get(source)
+        if sequence == expected:
+            self._expected[source] = sequence + 1 & 255
+        elif expected is not None or len(self._expected) < MAX_SOURCES:
+            gap = 0 if expected is None else (sequence - expected) & 255  # the first frame only starts the count
+            if gap < LATE:
+                counters.lost += gap
+                self._expected[source] = sequence + 1 & 255
+        if flags:
+            if flags != SIGNED:
+                counters.incompatible += 1
+                return False
+            counters.signed += 1
+        counters.frames += 1
+        counters.frames_v1 += version == V1
+        return True
 
     def _skip_unverified(
         self, data: bytes, reversed_data: bytes, i: int, following: int, sequence: int, source: int, wire_id: Any
@@ -272,14 +218,10 @@ class Parser:
             self._credit += SKIP
             return i
         if at_end or data[following] in FORMATS:
-            table = self.counters.bad_crc if bad else self.counters.unknown
-            if message_id in table:
-                table[message_id] += 1  # `count` without its call
-            else:
-                count(table, message_id)
+            count(self.counters.bad_crc if bad else self.counters.unknown, message_id)
             # its header may be damaged: the sequence number counts only if it is the expected one
             if self._expected.get(source) == sequence:
-                self._expected[source] = NEXT[sequence]
+                self._expected[source] = sequence + 1 & 255
             return following
         if bad:
             count(self.counters.bad_crc, message_id)
@@ -342,21 +284,27 @@ class Parser:
         if i + header > size:
             return i + header
         length, flags, _, _, wire_id = unpack(data, i)
-        known = self._known[version]
-        effect, _, _ = known[wire_id] if version == V1 or wire_id in known else UNKNOWN
+        effect, _, _ = self._known[version].get(wire_id, UNKNOWN)
         if effect < 0:
             return WRONG
         end = i + header + length
-        needed: int = end + (15 if flags and flags & SIGNED else 2)
+        needed: int = end + (SIGNED_TRAILER if flags and flags & SIGNED else TRAILER)
         if needed > size:
             return needed
         crc = crc_hqx(reversed_data[i:end], seed) ^ effect
         return VALID if crc == UNDO[reversed_data[end + 1]] ^ reversed_data[end] else WRONG
 
 
-def _unchecked(data: bytes, i: int, following: int, stamp: int) -> Frame:
+def _decoded(reader: Reader, data: bytes, start: int, end: int) -> Any:
+    """The message in the payload from `start` to `end`. MAVLink 2 cuts trailing zeros."""
+    kind, whole, fields = reader
+    if end - start >= whole:
+        return new(kind, fields(data, start))
+    return new(kind, fields(data[start:end].ljust(whole, b"\0")))
+
+
+def _unchecked(raw: bytes, stamp: int) -> Frame:
     """A frame of an unknown id, with the values of its header."""
-    raw = data[i:following]
     if raw[0] == V2:
         return Frame(int.from_bytes(raw[7:10], "little"), (raw[5], raw[6]), raw[4], None, raw, stamp)
     return Frame(raw[5], (raw[3], raw[4]), raw[2], None, raw, stamp)

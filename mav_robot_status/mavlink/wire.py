@@ -7,19 +7,13 @@ from __future__ import annotations
 
 import re
 from binascii import crc_hqx
+from collections.abc import Callable
 from functools import lru_cache
 from struct import Struct
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, NamedTuple
 
-from mav_robot_status.values import NamedTuple
-
-from .decode import READERS
+from .decode import READERS, Reader
 from .definitions import CRC_EXTRA
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from .decode import Reader
 
 MAX_FRAME: Final = 280
 """Bytes of the longest frame: header 10, payload 255, CRC 2, signature 13."""
@@ -64,13 +58,13 @@ UNKNOWN: Final[Known] = -1, -1, None
 
 
 @lru_cache(maxsize=8)
-def known_ids(wanted: frozenset[int]) -> dict[int, Any]:
+def known_ids(wanted: frozenset[int]) -> dict[int, dict[Any, Known]]:
     """All ids with a known CRC_EXTRA, by the magic byte and then by the bytes of the id in the frame."""
-    known_v1 = [UNKNOWN] * 256
-    known_v2 = {}
+    known_v1: dict[Any, Known] = {}
+    known_v2: dict[Any, Known] = {}
     for message_id, crc_extra in CRC_EXTRA.items():
         entry = REVERSED[crc_extra] << 8, message_id, READERS.get(message_id) if message_id in wanted else None
         known_v2[message_id.to_bytes(3, "little")] = entry
-        if message_id < len(known_v1):
+        if message_id < 256:
             known_v1[message_id] = entry
     return {V1: known_v1, V2: known_v2}

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..interface import DEFAULT_HANDLE_NAME
 from ..language import Trouble, state_of, troubles
 from ..language.states import CANNOT_ARM, EMERGENCY_STOP, LOST, NOT_HEARD
-from ..values import NamedTuple
 
 if TYPE_CHECKING:
     from ..json_object import JsonMapping

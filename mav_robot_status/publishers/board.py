@@ -8,23 +8,17 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Iterator
 from heapq import merge
-from typing import TYPE_CHECKING, Final
+from typing import Final, NamedTuple
 
-from ..clock import rfc3339
-from ..interface import STATES
+from ..clock import Instant, rfc3339
+from ..interface import STATES, Publisher, PublisherContext, RobotStatusMsg
 from ..interface.options import Options
+from ..json_object import JsonMapping, JsonObject
 from ..language.states import UNHEARD
-from ..values import NamedTuple
 from .alarms import Alarms
-from .json_lines import line_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from ..clock import Instant
-    from ..interface import PublisherContext, RobotStatusMsg
-    from ..json_object import JsonMapping, JsonObject
+from .json_lines import members
 
 MOST_HANDLES: Final = 4096
 MOST_MEMBERS: Final = 256
@@ -128,7 +122,7 @@ class Board:
         content = (msg.status, msg.detail)
         if self._seen.get(msg.handle) != content:
             self._seen[msg.handle] = content
-            self._change(entry, line_of(msg.handle, *content), stamp, now)
+            self._change(entry, members(msg.handle, *content), stamp, now)
         entry.stamp, entry.at = stamp, now
         entry.heartbeat_age = None if msg.heartbeat_age is None else round(max(0.0, msg.heartbeat_age), 3)
 
@@ -202,7 +196,7 @@ class Board:
         self.alarms.take(str(line["handle"]), line, stamp, self.version)
 
 
-class BoardPublisher:
+class BoardPublisher(Publisher):
     """Puts statuses on its board, for a view in the same process."""
 
     periodic = True
@@ -215,10 +209,6 @@ class BoardPublisher:
         self.lock = threading.Lock()
         """The lock of the board. Another thread must hold it to read the board."""
         self._waiting: list[RobotStatusMsg] = []
-
-    def busy(self) -> bool:
-        """Never."""
-        return False
 
     def publish(self, msg: RobotStatusMsg) -> None:
         """Hold the message until `service`, which follows every round of updates."""
@@ -236,9 +226,6 @@ class BoardPublisher:
         """Remove a handle that is gone from the board."""
         with self.lock:
             self.board.forget(handle)
-
-    def close(self) -> None:
-        """Nothing to release."""
 
 
 def _at(transition: Transition) -> float:

@@ -3,75 +3,43 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
-from ..clock import rfc3339
-from ..interface import FIELDS, Kind, RobotMode, TriState
+from ..clock import Instant, rfc3339
+from ..interface import (
+    FIELDS,
+    Detail,
+    Kind,
+    PublisherContext,
+    RobotStatus,
+    RobotStatusMsg,
+)
 from ..interface.options import Option, Options
+from ..json_object import JsonObject
 from .line_output import LineOutput, PatientLineOutput
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
-    from ..clock import Instant
-    from ..interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg, Vehicle
-    from ..json_object import JsonObject
-
-WORDS: Final[dict[Kind, Mapping[int, str]]] = {
-    Kind.MODE: {mode: f'"{mode.name}"' for mode in RobotMode},
-    Kind.TRI_STATE: {TriState.UNKNOWN: "null", TriState.FALSE: "false", TriState.TRUE: "true"},
-}
-"""The JSON of each value, by the kind of its field. A code is its own number."""
-MEMBERS: Final = tuple((f'"{field.name}": ', WORDS.get(field.kind)) for field in FIELDS)
-"""The name of each field, and the JSON of its values."""
+def members(handle: str, status: RobotStatus, detail: Detail) -> JsonObject:
+    """The members of a native line that change only with the status: all but stamp, seq and heartbeat_age."""
+    return {
+        "handle": handle,
+        "system": detail.system,
+        "component": detail.component,
+        **{field.name: field.plain(value) for field, value in zip(FIELDS, status, strict=True)},
+        "errors": [error.members() for error in detail.errors],
+        "inhibits": [inhibit.members() for inhibit in detail.inhibits],
+        "vehicle": detail.vehicle.members(),
+        **({"members": list(detail.members)} if detail.members else {}),
+        "link": {"state": detail.link.value},
+    }
 
 
 def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
-    """A native line without stamp, seq and heartbeat_age: the part that changes only with the status.
-
-    The text ends after link.state, so that `native` can append heartbeat_age. The encoder of `json` is slow. It runs
-    for new parts only, which keeps the delay of a changed line short.
-    """
-    errors = [error.members() for error in detail.errors]
-    inhibits = [inhibit.members() for inhibit in detail.inhibits]
-    body = (
-        f"{_who(handle, detail.system, detail.component)}, {_fields(status)}, "
-        f'"errors": {json.dumps(errors) if errors else "[]"}, '
-        f'"inhibits": {json.dumps(inhibits) if inhibits else "[]"}, '
-        f'"vehicle": {_vehicle(detail.vehicle)}, {_group(detail.members)}"link": {{"state": "{detail.link.value}"'
-    )
+    """The text of `members`, without the brackets around it: it ends after link.state, where `native` continues."""
+    body = json.dumps(members(handle, status, detail))[1:-2]
     return body.replace("\x7f", r"\u007f")  # the one control character that JSON does not escape
-
-
-@lru_cache(maxsize=256)
-def _who(handle: str, system: int | None, component: int | None) -> str:
-    return json.dumps({"handle": handle, "system": system, "component": component})[1:-1]
-
-
-@lru_cache(maxsize=256)
-def _fields(status: RobotStatus) -> str:
-    return ", ".join(
-        name + (str(value) if words is None else words[value])
-        for (name, words), value in zip(MEMBERS, status, strict=True)
-    )
-
-
-@lru_cache(maxsize=256)
-def _vehicle(vehicle: Vehicle) -> str:
-    return json.dumps(vehicle.members())
-
-
-@lru_cache(maxsize=256)
-def _group(members: tuple[str, ...]) -> str:
-    return f'"members": {json.dumps(members)}, ' if members else ""
-
-
-def line_of(handle: str, status: RobotStatus, detail: Detail) -> JsonObject:
-    """The members of the native line, without those that change in each one: stamp, seq and heartbeat_age."""
-    found: JsonObject = json.loads("{" + native_body(handle, status, detail) + "}}")
-    return found
 
 
 def native(msg: RobotStatusMsg, seq: int, body: str) -> str:

@@ -13,14 +13,10 @@ import math
 import os
 import select
 from stat import S_ISFIFO, S_ISREG
-from typing import TYPE_CHECKING, Final
+from typing import Final, TextIO
 
+from ..clock import Instant
 from ..errors import LinkError
-
-if TYPE_CHECKING:
-    from typing import TextIO
-
-    from ..clock import Instant
 
 log = logging.getLogger(__name__)
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import re
 import socket
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable
+from typing import Any, Final, NamedTuple
 
 from ..errors import LinkError
-from ..values import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 _ADDRESS: Final = re.compile(r"(?:\[(?P<v6>[0-9A-Za-z:.%-]+)\]|(?P<host>[^:\[\]\s]*))(?::(?P<port>[0-9]{1,5})?)?", re.A)
 _PORT: Final = re.compile(r"[0-9]{1,5}", re.A)

@@ -7,16 +7,13 @@ audience may ask for another interval or for none. It never gets more messages t
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from ..interface import FIELDS
+from ..clock import Instant
+from ..interface import FIELDS, Audience, RobotStatusMsg
 from ..mavlink.commands import PERIODS, ROBOT_STATUS
 from ..mavlink.definitions import RobotStatus as RobotStatusMessage
 from .rate_limiter import RateLimitedPublisher, Schedule
-
-if TYPE_CHECKING:
-    from ..clock import Instant
-    from ..interface import Audience, RobotStatusMsg
 
 INHIBITS: Final = (
     "LINK_STALE DISARMED E_STOPPED SAFETY_SWITCH PREARM_FAILING INITIALISING CALIBRATING POWERING_OFF TERMINATION "

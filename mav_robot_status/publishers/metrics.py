@@ -6,19 +6,24 @@ our names and those of the configuration, never an autopilot's texts: these woul
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, NamedTuple
 
-from ..interface import FIELDS, Kind, LinkState
-from ..values import NamedTuple
+from ..interface import (
+    FIELDS,
+    ConnectionMetrics,
+    ErrorCause,
+    Inhibit,
+    Kind,
+    LinkState,
+    Metrics,
+    PublisherMetrics,
+    RobotStatusMsg,
+)
 from ..version import __version__
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
-
-    from ..interface import ConnectionMetrics, ErrorCause, Inhibit, Metrics, PublisherMetrics, RobotStatusMsg
-
-    Labels = dict[str, object]
+Labels = dict[str, object]
 
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 PREFIX: Final = "mav_robot_status_"

@@ -8,23 +8,18 @@ Autopilots with the same system id have one status: what they do not agree on is
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
 
-from ..interface import FIELDS, STATES, RobotMode, RobotStatus, TriState
+from ..interface import FIELDS, STATES, Audience, RobotMode, RobotStatus, RobotStatusMsg, TriState
+from ..json_object import JsonMapping
 from ..language import State, Trouble, state_of, troubles
 from ..language.states import EMERGENCY_STOP, LOST, UNKNOWN
 from ..mavlink.definitions import NamedValueInt, Statustext
-from ..values import NamedTuple
-from .json_lines import line_of
+from .json_lines import members
 from .rate_limiter import RateLimitedPublisher, Schedule
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from ..interface import Audience, RobotStatusMsg
-    from ..json_object import JsonMapping
-
-    Key = tuple[str, str, str]
+Key = tuple[str, str, str]
 
 VALUE_INTERVAL: Final = 2.0  # s
 TEXT_INTERVAL: Final = 2.0  # s, the minimum, but for a text that is worse than the last one
@@ -174,7 +169,7 @@ class NamedValuePublisher(RateLimitedPublisher[_Sent]):
         settled = sent.msg
         if settled is not None and settled.status == msg.status and settled.detail == msg.detail:
             return math.inf
-        line = line_of(msg.handle, msg.status, msg.detail)
+        line = members(msg.handle, msg.status, msg.detail)
         found = texts(line, msg.status.mode, sent.mode, sent.known, msg.heartbeat_age)
         while found:
             first = found[0]

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from ..interface import Options
-
-if TYPE_CHECKING:
-    from ..clock import Instant
-    from ..interface import PublisherContext, RobotStatusMsg
+from ..interface import Options, Publisher, PublisherContext, RobotStatusMsg
 
 MAX_MESSAGES: Final = 10_000
 
 
-class QueuePublisher:
+class QueuePublisher(Publisher):
     """Holds messages until another thread takes them. It has no options.
 
     On live links a full queue drops its oldest message and counts it, so a slow reader never delays the gateway. A
@@ -35,10 +31,6 @@ class QueuePublisher:
         self._changed = threading.Condition()
         self._ended = False
 
-    def busy(self) -> bool:
-        """Never."""
-        return False
-
     def publish(self, msg: RobotStatusMsg) -> None:
         """Append the message."""
         with self._changed:
@@ -49,12 +41,6 @@ class QueuePublisher:
                 self.dropped += 1
             self._messages.append(msg)
             self._changed.notify_all()
-
-    def service(self, now: Instant) -> None:
-        """Nothing waits."""
-
-    def close(self) -> None:
-        """Nothing is held. The reader waits until `end`: other publishers may still be closing."""
 
     def end(self) -> None:
         """No more messages follow. The reader still gets the waiting ones."""

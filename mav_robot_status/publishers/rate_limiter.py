@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import TYPE_CHECKING, ClassVar, Final, Generic, TypeVar
+from collections.abc import Hashable, Sequence
+from typing import ClassVar, Final, Generic, TypeVar
 
-from ..interface import LinkState
+from ..clock import Instant
+from ..interface import Audience, LinkState, Publisher, PublisherContext, RobotStatusMsg
 from ..interface.options import Options
-
-if TYPE_CHECKING:
-    from collections.abc import Hashable, Sequence
-
-    from ..clock import Instant
-    from ..interface import Audience, PublisherContext, RobotStatusMsg
 
 MOST_CHANGES: Final = 5
 WINDOW: Final = 1.0  # s
@@ -61,7 +57,7 @@ class Schedule:
         return now
 
 
-class RateLimitedPublisher(ABC, Generic[S]):
+class RateLimitedPublisher(Publisher, ABC, Generic[S]):
     """Holds the last message of each handle, and a state `S` for each handle and audience.
 
     A new audience gets the last message of each handle at once; if there was no audience before, in the next turn. The
@@ -102,10 +98,6 @@ class RateLimitedPublisher(ABC, Generic[S]):
     @abstractmethod
     def next_periodic(self, audience: Audience, state: S) -> float:
         """When the next periodic message to this audience will be due, monotonic seconds."""
-
-    def busy(self) -> bool:
-        """Never. A message beyond the limit is delayed, and a newer one replaces it."""
-        return False
 
     @property
     def queued(self) -> int:
@@ -149,9 +141,6 @@ class RateLimitedPublisher(ABC, Generic[S]):
         self._rests.pop(handle, None)
         for states in self._states.values():
             states.pop(handle, None)
-
-    def close(self) -> None:
-        """Nothing to release."""
 
     def _serve(self, audiences: list[Audience]) -> bool:
         """Send to these from now on. Returns whether a controller rests because of the previous ones."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
-from .codec import DecodedMessage
-from .definitions import CommandAck, FileTransferProtocol, MessageInterval, ParamValue
+from pymavlink.dialects.v20 import all as dialect
+
 from .firmware import (
     ACCEPTED,
     ARDUPILOT,
@@ -37,9 +38,11 @@ AUTOPILOT_VERSION, AVAILABLE_MODES, COMPONENT_METADATA = 148, 435, 397
 STREAM_GROUPS = {2: (1,), 3: (36,), 6: (33, 32), 10: (30,), 11: (74,), 12: (2,)}
 """ArduPilot's stream groups: the message ids that REQUEST_DATA_STREAM starts. Group 0 means all groups."""
 INT16 = 4
+FILE_TRANSFER_SIZE = 251
+"""Bytes of FILE_TRANSFER_PROTOCOL.payload."""
 
 
-def answer(model: VehicleModel, message: DecodedMessage) -> None:
+def answer(model: VehicleModel, message: Any) -> None:
     """Process one received message. The next `VehicleModel.run` returns the answers."""
     model.peer_seen = True
     model.gcs_seen |= message.get_type() == "HEARTBEAT" and message.type == GCS
@@ -47,18 +50,18 @@ def answer(model: VehicleModel, message: DecodedMessage) -> None:
         ANSWERS[message.get_type()](model, message)
 
 
-def _command(model: VehicleModel, m: DecodedMessage) -> None:
+def _command(model: VehicleModel, m: Any) -> None:
     result = COMMANDS[m.command](model, m) if m.command in COMMANDS else UNSUPPORTED
     _acknowledge(model, m, m.command, result)
     if m.command == DO_SET_MODE and model.firmware.autopilot == PX4:
         _acknowledge(model, m, m.command, result)  # PX4 acknowledges this command twice
 
 
-def _acknowledge(model: VehicleModel, m: DecodedMessage, command: int, result: int) -> None:
-    model.send(CommandAck(command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent()))
+def _acknowledge(model: VehicleModel, m: Any, command: int, result: int) -> None:
+    model.send(dialect.MAVLink_command_ack_message(command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent()))
 
 
-def _set_message_interval(model: VehicleModel, m: DecodedMessage) -> int:
+def _set_message_interval(model: VehicleModel, m: Any) -> int:
     message_id, microseconds = m.param1, m.param2
     if not can_send(model.firmware, message_id):
         return FAILED
@@ -74,16 +77,16 @@ def _set_message_interval(model: VehicleModel, m: DecodedMessage) -> int:
     return ACCEPTED
 
 
-def _get_message_interval(model: VehicleModel, m: DecodedMessage) -> int:
+def _get_message_interval(model: VehicleModel, m: Any) -> int:
     if not can_send(model.firmware, m.param1):
         return FAILED
     message_id = int(m.param1)
     interval = model.interval(message_id)
-    model.send(MessageInterval(-1 if interval is None else round(interval * 1e6), message_id))
+    model.send(dialect.MAVLink_message_interval_message(message_id, -1 if interval is None else round(interval * 1e6)))
     return ACCEPTED
 
 
-def _request_message(model: VehicleModel, m: DecodedMessage) -> int:
+def _request_message(model: VehicleModel, m: Any) -> int:
     if m.param1 == AVAILABLE_MODES and model.firmware.modes:
         for mode in available_modes(model.firmware, int(m.param2) if math.isfinite(m.param2) else 0):
             model.send(mode)
@@ -100,7 +103,7 @@ def _request_message(model: VehicleModel, m: DecodedMessage) -> int:
     return ACCEPTED
 
 
-def _arm_disarm(model: VehicleModel, m: DecodedMessage) -> int:
+def _arm_disarm(model: VehicleModel, m: Any) -> int:
     arm, forced, state = m.param1 == 1, m.param2 == FORCED, model.state
     if arm and not_armable(state) and not forced:
         refusal = model.firmware.arming_refused
@@ -113,7 +116,7 @@ def _arm_disarm(model: VehicleModel, m: DecodedMessage) -> int:
     return ACCEPTED
 
 
-def _run_prearm_checks(model: VehicleModel, m: DecodedMessage) -> int:
+def _run_prearm_checks(model: VehicleModel, m: Any) -> int:
     """Only ArduPilot announces the reasons in texts. The periodic announcement keeps its period, as in the firmware."""
     if not model.firmware.prearm_prefix:
         return UNSUPPORTED
@@ -123,7 +126,7 @@ def _run_prearm_checks(model: VehicleModel, m: DecodedMessage) -> int:
     return ACCEPTED
 
 
-def _do_aux_function(model: VehicleModel, m: DecodedMessage) -> int:
+def _do_aux_function(model: VehicleModel, m: Any) -> int:
     if model.firmware.autopilot != ARDUPILOT or m.param1 != MOTOR_ESTOP:
         return UNSUPPORTED
     if m.param2 in (LOW, HIGH):
@@ -131,7 +134,7 @@ def _do_aux_function(model: VehicleModel, m: DecodedMessage) -> int:
     return ACCEPTED
 
 
-def _do_set_mode(model: VehicleModel, m: DecodedMessage) -> int:
+def _do_set_mode(model: VehicleModel, m: Any) -> int:
     if not all(map(math.isfinite, (m.param1, m.param2, m.param3))):
         return DENIED
     if model.firmware.autopilot == PX4:
@@ -139,7 +142,7 @@ def _do_set_mode(model: VehicleModel, m: DecodedMessage) -> int:
     return _change_mode(model, int(m.param1), int(m.param2))
 
 
-def _set_mode(model: VehicleModel, m: DecodedMessage) -> None:
+def _set_mode(model: VehicleModel, m: Any) -> None:
     command = SET_MODE if model.firmware.autopilot == ARDUPILOT else DO_SET_MODE
     _acknowledge(model, m, command, _change_mode(model, m.base_mode, m.custom_mode))
 
@@ -154,7 +157,7 @@ def _change_mode(model: VehicleModel, base_mode: int, custom_mode: int) -> int:
     return ACCEPTED
 
 
-def _request_data_stream(model: VehicleModel, m: DecodedMessage) -> None:
+def _request_data_stream(model: VehicleModel, m: Any) -> None:
     if model.firmware.autopilot != ARDUPILOT:
         return
     groups = STREAM_GROUPS if m.req_stream_id == 0 else {m.req_stream_id}
@@ -162,23 +165,25 @@ def _request_data_stream(model: VehicleModel, m: DecodedMessage) -> None:
         model.request(message_id, 1 / m.req_message_rate if m.start_stop == 1 and m.req_message_rate else None)
 
 
-def _param_request_read(model: VehicleModel, m: DecodedMessage) -> None:
+def _param_request_read(model: VehicleModel, m: Any) -> None:
     """Like ArduPilot, this sends nothing for an unknown parameter."""
     names = list(model.firmware.parameters)
     name = m.param_id if m.param_index < 0 else names[m.param_index] if m.param_index < len(names) else ""
     if name in model.firmware.parameters:
         value = float(model.firmware.parameters[name])
-        model.send(ParamValue(value, len(names), m.param_index & 0xFFFF, name.encode(), INT16))
+        model.send(dialect.MAVLink_param_value_message(name.encode(), value, INT16, len(names), m.param_index & 0xFFFF))
 
 
-def _file_transfer(model: VehicleModel, m: DecodedMessage) -> None:
+def _file_transfer(model: VehicleModel, m: Any) -> None:
     client = m.get_srcSystem(), m.get_srcComponent()
     if model.file_server is not None:
-        for payload in model.file_server.answer(m.payload, model.now):
-            model.send(FileTransferProtocol(0, *client, payload))
+        for payload in model.file_server.answer(bytes(m.payload), model.now):
+            model.send(
+                dialect.MAVLink_file_transfer_protocol_message(0, *client, payload.ljust(FILE_TRANSFER_SIZE, b"\0"))
+            )
 
 
-COMMANDS: dict[int, Callable[[VehicleModel, DecodedMessage], int]] = {
+COMMANDS: dict[int, Callable[[VehicleModel, Any], int]] = {
     GET_MESSAGE_INTERVAL: _get_message_interval,
     SET_MESSAGE_INTERVAL: _set_message_interval,
     REQUEST_MESSAGE: _request_message,
@@ -187,7 +192,7 @@ COMMANDS: dict[int, Callable[[VehicleModel, DecodedMessage], int]] = {
     DO_AUX_FUNCTION: _do_aux_function,
     DO_SET_MODE: _do_set_mode,
 }
-ANSWERS: dict[str, Callable[[VehicleModel, DecodedMessage], None]] = {
+ANSWERS: dict[str, Callable[[VehicleModel, Any], None]] = {
     "COMMAND_LONG": _command,
     "COMMAND_INT": _command,
     "SET_MODE": _set_mode,

@@ -8,10 +8,10 @@ from __future__ import annotations
 import json
 import lzma
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from ..json_object import JsonMapping, JsonObject
 from ..mavlink.ftp.metadata import EVENTS, crc32
-from ..values import NamedTuple
 from .firmware import px4_mode
 
 GENERAL = "etc/extras/component_general.json.xz"

@@ -11,7 +11,8 @@ import socket
 import struct
 import threading
 import time
-from typing import TYPE_CHECKING, Any, Final
+from types import TracebackType
+from typing import Any, Final
 
 from ..hardware.ur.rtde import (
     CONTROLLER,
@@ -26,9 +27,6 @@ from ..hardware.ur.rtde import (
     VERSION,
     frame,
 )
-
-if TYPE_CHECKING:
-    from types import TracebackType
 
 PAUSE: Final = ord("P")
 KINDS: Final = {

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..clock import Instant
 from ..mavlink.signing import Signer
-from .codec import DecodedMessage, decode
+from .codec import decode
 from .commands import answer
 from .event_table import VehicleFiles
 from .lossy import Lossy, LossyLink
@@ -68,7 +68,7 @@ class FakeAutopilot(UdpFake):
         self._sent: LossyLink[bytes] = LossyLink(lossy or Lossy())
         self._arrived: LossyLink[tuple[bytes, Address]] = LossyLink((lossy or Lossy())._replace(seed=1))
         self._pending: deque[Step] = deque()
-        self._received: deque[DecodedMessage] = deque(maxlen=RECEIVED_KEPT)
+        self._received: deque[Any] = deque(maxlen=RECEIVED_KEPT)
         self._lock = threading.Lock()
         self.address: Address = self._socket.getsockname()
         """The local address. It receives there."""
@@ -85,7 +85,7 @@ class FakeAutopilot(UdpFake):
         """True when no step of the scenario is left."""
         return self._model is not None and self._model.finished
 
-    def heard(self, kind: str | None = None) -> list[DecodedMessage]:
+    def heard(self, kind: str | None = None) -> list[Any]:
         """The last 1000 received messages, oldest first; only those named `kind` if it is given."""
         with self._lock:
             return [m for m in self._received if kind is None or m.get_type() == kind]
@@ -148,7 +148,7 @@ class FakeAutopilot(UdpFake):
         for frame in self._sent.carry(frames):
             self._send(frame)
 
-    def _handle(self, model: VehicleModel, messages: list[DecodedMessage], sender: Address) -> None:
+    def _handle(self, model: VehicleModel, messages: list[Any], sender: Address) -> None:
         if not messages or not model.listening:
             return
         if self._answers_sender:
@@ -168,7 +168,7 @@ class FakeAutopilot(UdpFake):
             self._send_to(self._to, frame)
 
 
-def _is_for(message: DecodedMessage, system: int, component: int) -> bool:
+def _is_for(message: Any, system: int, component: int) -> bool:
     """Whether a message is a broadcast, or addressed to this vehicle."""
     to_system, to_component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
     return to_system in (0, system) and to_component in (0, component)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-
-from mav_robot_status.values import NamedTuple
+from typing import NamedTuple
 
 from .scenario import MOTOR_OUTPUTS, PREARM_CHECK, Step, VehicleState
 

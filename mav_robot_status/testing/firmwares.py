@@ -130,19 +130,13 @@ ARDUROVER = Firmware(
     ready=_ROVER_READY,
 )
 
-ARDUCOPTER = Firmware(
+ARDUCOPTER = ARDUROVER._replace(
     name="ArduPilot Copter",
-    version=0x040506FF,
     type=2,
-    autopilot=ARDUPILOT,
     base_modes=dict.fromkeys((0, 1, 2, 9, 11, 13, 14, 15, 18, 20, 22, 24, 25, 28), 81)
     | dict.fromkeys((3, 4, 5, 6, 7, 16, 17, 19, 21, 23, 27), 89),
     status=_copter_status,
     outputs=_copter_outputs,
-    streams={},
-    refused=FAILED,
-    prearm_prefix="PreArm: ",
-    arming_refused="Arm: {}",
     armed_text="Arming motors",
     disarmed_text="Disarming motors",
     parameters=_servo_functions({1: 33, 2: 34, 3: 35, 4: 36}),

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable
-from typing import Generic, TypeVar
-
-from mav_robot_status.values import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 T = TypeVar("T")
 

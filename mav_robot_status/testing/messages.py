@@ -4,28 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from mav_robot_status.values import NamedTuple
+from pymavlink.dialects.v20 import all as dialect
 
-from .definitions import (
-    Attitude,
-    AutopilotVersion,
-    AvailableModes,
-    ComponentMetadata,
-    CurrentMode,
-    EkfStatusReport,
-    ExtendedSysState,
-    GlobalPositionInt,
-    Heartbeat,
-    HighLatency2,
-    LocalPositionNed,
-    NamedValueFloat,
-    ServoOutputRaw,
-    Statustext,
-    SysStatus,
-    SystemTime,
-    VfrHud,
-)
+from ..mavlink.definitions import ComponentMetadata
 from .event_table import VehicleFiles
 from .firmware import ARDUPILOT, PX4, Firmware, base_mode, sensors, system_status
 from .scenario import Text, VehicleState
@@ -49,10 +32,10 @@ class Snapshot(NamedTuple):
     unix_us: int
 
 
-def heartbeat(s: Snapshot) -> NamedTuple:
+def heartbeat(s: Snapshot) -> Any:
     """HEARTBEAT."""
     f, state = s.firmware, s.state
-    return Heartbeat(
+    return dialect.MAVLink_heartbeat_message(
         custom_mode=state.custom_mode,
         type=f.type,
         autopilot=f.autopilot,
@@ -62,9 +45,9 @@ def heartbeat(s: Snapshot) -> NamedTuple:
     )
 
 
-def _sys_status(s: Snapshot) -> NamedTuple:
+def _sys_status(s: Snapshot) -> Any:
     present, enabled, health = sensors(s.firmware, s.state, s.prearm_ok)
-    return SysStatus(
+    return dialect.MAVLink_sys_status_message(
         onboard_control_sensors_present=present,
         onboard_control_sensors_enabled=enabled,
         onboard_control_sensors_health=health,
@@ -84,52 +67,54 @@ def _sys_status(s: Snapshot) -> NamedTuple:
     )
 
 
-def _system_time(s: Snapshot) -> NamedTuple:
-    return SystemTime(s.unix_us if s.state.position else 0, s.boot_ms)
+def _system_time(s: Snapshot) -> Any:
+    return dialect.MAVLink_system_time_message(s.unix_us if s.state.position else 0, s.boot_ms)
 
 
-def _attitude(s: Snapshot) -> NamedTuple:
-    return Attitude(s.boot_ms, 0.0, 0.0, 0.0, *s.state.rates)
+def _attitude(s: Snapshot) -> Any:
+    return dialect.MAVLink_attitude_message(s.boot_ms, 0.0, 0.0, 0.0, *s.state.rates)
 
 
-def _local_position(s: Snapshot) -> NamedTuple:
-    return LocalPositionNed(s.boot_ms, 0.0, 0.0, 0.0, *s.state.velocity)
+def _local_position(s: Snapshot) -> Any:
+    return dialect.MAVLink_local_position_ned_message(s.boot_ms, 0.0, 0.0, 0.0, *s.state.velocity)
 
 
-def _global_position(s: Snapshot) -> NamedTuple:
+def _global_position(s: Snapshot) -> Any:
     lat, lon, alt = HOME if s.state.position else (0, 0, 0)
     vx, vy, vz = (round(v * 100) for v in s.state.velocity)
-    return GlobalPositionInt(s.boot_ms, lat, lon, alt, 0, vx, vy, vz, 0)
+    return dialect.MAVLink_global_position_int_message(s.boot_ms, lat, lon, alt, 0, vx, vy, vz, 0)
 
 
-def _servo_outputs(s: Snapshot) -> NamedTuple:
+def _servo_outputs(s: Snapshot) -> Any:
     outputs = s.firmware.outputs(s.state) if s.state.servos is None else s.state.servos
     main, auxiliary = (outputs + (0,) * 8)[:8], (outputs[8:] + (0,) * 8)[:8]
-    return ServoOutputRaw._make((s.boot_ms * 1000 & 0xFFFFFFFF, *main, 0, *auxiliary))
+    return dialect.MAVLink_servo_output_raw_message(s.boot_ms * 1000 & 0xFFFFFFFF, 0, *main, *auxiliary)
 
 
-def _vfr_hud(s: Snapshot) -> NamedTuple:
+def _vfr_hud(s: Snapshot) -> Any:
     north, east, down = s.state.velocity
     speed = math.hypot(north, east)
-    return VfrHud(
+    return dialect.MAVLink_vfr_hud_message(
         airspeed=speed, groundspeed=speed, alt=HOME[2] / 1000, climb=-down, heading=0, throttle=s.state.throttle
     )
 
 
-def _extended_sys_state(s: Snapshot) -> NamedTuple:
+def _extended_sys_state(s: Snapshot) -> Any:
     vtol_state = s.firmware.vtol_state if s.state.vtol_state is None else s.state.vtol_state
-    return ExtendedSysState(vtol_state, s.state.landed_state)
+    return dialect.MAVLink_extended_sys_state_message(vtol_state, s.state.landed_state)
 
 
-def _current_mode(s: Snapshot) -> NamedTuple:
+def _current_mode(s: Snapshot) -> Any:
     number = s.state.custom_mode
     standard_mode = next((mode.standard_mode for mode in s.firmware.modes if mode.custom_mode == number), 0)
-    return CurrentMode(custom_mode=number, intended_custom_mode=number, standard_mode=standard_mode)
+    return dialect.MAVLink_current_mode_message(
+        custom_mode=number, intended_custom_mode=number, standard_mode=standard_mode
+    )
 
 
-def _ekf_status_report(s: Snapshot) -> NamedTuple:
+def _ekf_status_report(s: Snapshot) -> Any:
     flags = ESTIMATED if s.state.position else UNAIDED
-    return EkfStatusReport(0.1, 0.1, 0.1, 0.1, 0.0, flags=flags, airspeed_variance=0.0)
+    return dialect.MAVLink_ekf_status_report_message(flags, 0.1, 0.1, 0.1, 0.1, 0.0)
 
 
 FAILURE_FLAGS = {5: 1, 4: 2, 3: 4, 1: 8, 0: 16, 2: 32, 22: 64, 25: 128, 16: 256, 20: 2048, 21: 4096}
@@ -137,7 +122,7 @@ FAILURE_FLAGS = {5: 1, 4: 2, 3: 4, 1: 8, 0: 16, 2: 32, 22: 64, 25: 128, 16: 256,
 UNTOLD = -128
 
 
-def high_latency2(s: Snapshot) -> NamedTuple:
+def high_latency2(s: Snapshot) -> Any:
     """HIGH_LATENCY2: ArduPilot sends base_mode, and sets a flag for a sensor that it lacks; PX4 does neither."""
     f, state = s.firmware, s.state
     north, east, down = state.velocity
@@ -146,7 +131,7 @@ def high_latency2(s: Snapshot) -> NamedTuple:
     _, enabled, health = sensors(f, state, s.prearm_ok)
     faulty = ~health & (enabled if is_px4 else -1)
     armed = base_mode(f, state)
-    return HighLatency2(
+    return dialect.MAVLink_high_latency2_message(
         timestamp=s.boot_ms,
         latitude=lat,
         longitude=lon,
@@ -182,12 +167,12 @@ def applet_value(state: VehicleState) -> int:
     return state.emergency_stop + 2 * state.safety_switch
 
 
-def applet_report(s: Snapshot) -> NamedTuple:
+def applet_report(s: Snapshot) -> Any:
     """NAMED_VALUE_FLOAT RS_STOP, as the applet sends it."""
-    return NamedValueFloat(s.boot_ms, applet_value(s.state), b"RS_STOP")
+    return dialect.MAVLink_named_value_float_message(s.boot_ms, b"RS_STOP", applet_value(s.state))
 
 
-BUILDERS: dict[int, Callable[[Snapshot], NamedTuple]] = {
+BUILDERS: dict[int, Callable[[Snapshot], Any]] = {
     HEARTBEAT: heartbeat,
     SYS_STATUS: _sys_status,
     2: _system_time,
@@ -213,10 +198,10 @@ def can_send(firmware: Firmware, message_id: int) -> bool:
     )
 
 
-def available_modes(firmware: Firmware, index: int) -> list[NamedTuple]:
+def available_modes(firmware: Firmware, index: int) -> list[Any]:
     """AVAILABLE_MODES of the mode with this index, which counts from 1; 0: of all modes."""
     return [
-        AvailableModes(
+        dialect.MAVLink_available_modes_message(
             custom_mode=mode.custom_mode,
             properties=mode.properties,
             number_modes=len(firmware.modes),
@@ -229,21 +214,21 @@ def available_modes(firmware: Firmware, index: int) -> list[NamedTuple]:
     ]
 
 
-def autopilot_version(firmware: Firmware) -> NamedTuple:
+def autopilot_version(firmware: Firmware) -> Any:
     """AUTOPILOT_VERSION."""
-    return AutopilotVersion._make((0, 0, firmware.version, *(0,) * 5, *(b"",) * 4))
+    return dialect.MAVLink_autopilot_version_message(0, firmware.version, 0, 0, 0, *(bytes(8),) * 3, 0, 0, 0)
 
 
-def component_metadata(s: Snapshot, files: VehicleFiles) -> NamedTuple:
+def component_metadata(s: Snapshot, files: VehicleFiles) -> Any:
     """COMPONENT_METADATA."""
     return ComponentMetadata(s.boot_ms, files.crc, files.uri.encode())
 
 
-def statustexts(firmware: Firmware, text: Text, number: int) -> list[NamedTuple]:
+def statustexts(firmware: Firmware, text: Text, number: int) -> list[Any]:
     """The STATUSTEXT messages of one text. PX4 numbers every text, others only texts in several chunks. An empty chunk
     follows a full last chunk, because only a short chunk marks the end."""
     data = text.text.encode()
     if firmware.autopilot != PX4 and len(data) <= CHUNK:
-        return [Statustext(text.severity, data, 0, 0)]
+        return [dialect.MAVLink_statustext_message(text.severity, data, 0, 0)]
     chunks = [data[i : i + CHUNK] for i in range(0, len(data) + 1, CHUNK)]
-    return [Statustext(text.severity, chunk, number, i) for i, chunk in enumerate(chunks)]
+    return [dialect.MAVLink_statustext_message(text.severity, chunk, number, i) for i, chunk in enumerate(chunks)]

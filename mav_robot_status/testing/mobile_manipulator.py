@@ -13,10 +13,9 @@ import signal
 import sys
 import time
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from ..streams import say
-from ..values import NamedTuple
 from .fake_arm import FakeArm
 from .fake_autopilot import FakeAutopilot
 from .firmwares import ARDUROVER

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 from ..clock import Instant
-from ..values import NamedTuple
 from .codec import encode
 from .event_table import VehicleFiles
 from .file_server import FileServer
@@ -43,8 +43,8 @@ CATCH_UP = 10.0
 class Outgoing(NamedTuple):
     """A message and its sequence number."""
 
-    message: NamedTuple
-    """One of `testing.definitions`."""
+    message: Any
+    """One of pymavlink or of `mavlink.definitions`."""
     seq: int
 
     def frame(self, system: int = 1, component: int = 1) -> bytes:

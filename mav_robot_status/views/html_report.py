@@ -12,28 +12,23 @@ import html
 import json
 import os
 from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ..clock import rfc3339
 from ..errors import LinkError, UsageError
 from ..interface import STATES, Kind, LinkState, RobotMode
+from ..json_object import JsonObject
 from ..language import LOOKS, remedy, style_sheet
 from ..language.shapes import drawing
 from ..language.states import UNSURE
 from ..language.values import NO, UNKNOWN, YES
 from ..streams import visible
-from .timeline import TRACKS, Span
-from .totals import totals
+from .timeline import TRACKS, Reason, Span, Timeline, VehicleTimeline
+from .totals import ReasonTotal, Totals, totals
 from .verdict import verdict
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from ..json_object import JsonObject
-    from .timeline import Reason, Timeline, VehicleTimeline
-    from .totals import ReasonTotal, Totals
 
 WORDS: Final = {"TRUE": True, "FALSE": False, "UNKNOWN": None}
 """The JSON of a TriState."""

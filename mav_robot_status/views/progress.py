@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final, TextIO
 
 from ..streams import visible
-
-if TYPE_CHECKING:
-    from typing import TextIO
 
 WIDTH: Final = 30
 """Characters of the bar."""

@@ -7,17 +7,12 @@ log's clock is set, a new segment begins: no interval spans it, and each segment
 from __future__ import annotations
 
 import bisect
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import Final, NamedTuple
 
-from ..interface import STATES, LinkState, TriState
-from ..values import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from ..clock import Instant
-    from ..interface import Detail, Evidence, IndustrialRobotStatusHandle, RobotStatus
+from ..clock import Instant
+from ..interface import STATES, Detail, Evidence, IndustrialRobotStatusHandle, LinkState, RobotStatus, TriState
 
 UNTOLD: Final = {"HEARTBEAT_LATE", "SENDER_UNCERTAIN"}
 """Inhibits with which nobody knows whether the autopilot is armed."""

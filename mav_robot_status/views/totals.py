@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, Final
-
-from mav_robot_status.values import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final, NamedTuple
 
 from ..interface import LinkState
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from .timeline import Reason, Span, VehicleTimeline
+from .timeline import Reason, Span, VehicleTimeline
 
 MOST_TEXTS: Final = 20
 """Different texts listed for one reason."""

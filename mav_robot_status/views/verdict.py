@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import rfc3339
 from ..language import State
@@ -21,7 +21,6 @@ from ..language.states import (
     sentence,
     state_of_error,
 )
-from ..values import NamedTuple
 from .totals import arm_cycles
 
 if TYPE_CHECKING:

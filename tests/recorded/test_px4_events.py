@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_robot_status.gateway.recorded_log import Recording
+from mav_robot_status.gateway.logs.recorded_log import Recording
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.px4_events import EventTable
 from mav_robot_status.hardware.mavlink.px4_events.parsing import parse

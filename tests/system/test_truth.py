@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from mav_robot_status.clock import Instant, later
+from mav_robot_status.mavlink.definitions import Event
 from mav_robot_status.testing import FakeAutopilot, Scenario, arducopter, ardurover, px4, step
-from mav_robot_status.testing.definitions import Event
 from mav_robot_status.testing.scenario import RC_RECEIVER
 from mav_robot_status.testing.vehicle_model import Outgoing, VehicleModel
 

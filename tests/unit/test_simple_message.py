@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_robot_status.errors import ProtocolError
 from mav_robot_status.interface import RobotMode, RobotStatus, TriState
-from mav_robot_status.simple_message import FIELDS, LONGEST_LENGTH, ORDERS, FrameError, StatusEncoder, StatusReader
+from mav_robot_status.simple_message import FIELDS, LONGEST_LENGTH, ORDERS, StatusEncoder, StatusReader
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 EXAMPLE = RobotStatus(RobotMode.AUTO, FALSE, TRUE, TRUE, UNKNOWN, TRUE, 2001)
@@ -71,13 +72,13 @@ def test_other_messages_are_skipped(other: bytes) -> None:
     ],
 )
 def test_a_peer_that_speaks_otherwise_gets_one_reason(data: bytes, why: str) -> None:
-    with pytest.raises(FrameError, match=why):
+    with pytest.raises(ProtocolError, match=why):
         StatusReader("little").feed(data)
 
 
 @given(st.lists(st.binary(max_size=100)), st.sampled_from(list(ORDERS)))
 def test_no_bytes_raise_anything_else(pieces: list[bytes], order: str) -> None:
     reader = StatusReader(order)
-    with contextlib.suppress(FrameError):
+    with contextlib.suppress(ProtocolError):
         for piece in pieces:
             reader.feed(piece)

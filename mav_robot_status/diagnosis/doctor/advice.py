@@ -7,22 +7,16 @@ Betaflight's command lines.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final, NamedTuple
 
 from ...clock import rfc3339
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_ARDUPILOTMEGA, MAV_AUTOPILOT_PX4
-from ...values import NamedTuple
-from ..applet import PAGE, WORDS
-from .findings import HEARTBEAT
+from ..vehicle_reports import PAGE, WORDS
+from .findings import HEARTBEAT, Findings, Speaker
 from .heard import duration
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    from ..applet import PAGE, WORDS
-from .findings import Findings, Speaker
 
 BROKEN: Final = 50.0
 """From this percentage of lost frames on, the advice is to repair the link first."""

@@ -7,23 +7,15 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from ...interface import STATES
+from ...interface import STATES, RobotStatus
 from ...links.url import host_port
 from ...simple_message import SHORTEST, STATE_PORT, STATUS, STATUS_LENGTH
-from ...values import NamedTuple
 from .advice import protocol
-from .diagnosis import Diagnosis
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from ...interface import RobotStatus
-
-    Test = Callable[["ArmFindings"], object]
-    Words = Callable[["ArmFindings"], str]
+from .diagnosis import Case, Diagnosis, Test, first_case
 
 DASHBOARD: Final = re.compile(rb"\AConnected: Universal Robots Dashboard Server")
 PORTS: Final = {
@@ -76,21 +68,9 @@ class ArmFindings:
         return f"{self.kind}:{self.where}" if self.port else f"{self.kind} '{self.name}'"
 
 
-class ArmCase(NamedTuple):
-    """One row of the table."""
-
-    cause: str
-    meaning: str
-    """The row of the reference page."""
-    applies: Test
-    matter: Words
-    next: Words
-
-
 def diagnose_arm(f: ArmFindings) -> Diagnosis:
     """The first case that applies."""
-    case = next(case for case in ARM_CASES if case.applies(f))
-    return Diagnosis(case.cause, f.status is not None, case.matter(f), case.next(f))
+    return first_case(ARM_CASES, f, f.status is not None)
 
 
 def _trouble(*values: str) -> Test:
@@ -114,82 +94,75 @@ def _other_port(f: ArmFindings) -> str:
 
 
 ARM_CASES: Final = (
-    ArmCase("ok", "a status is available",
-            lambda f: f.status is not None,
-            lambda f: "a status is available",
-            lambda f: f"mav-robot-status --arm {f.connection}" if f.port else "mav-robot-status with this --config"),
-    ArmCase("unknown-name", "the name of the controller is unknown",
-            _trouble("unknown name"),
-            lambda f: f"the name {f.host} is unknown", lambda f: "check the name, or write the address"),
-    ArmCase("tcp-refused", "nothing listens on that TCP port of the controller",
-            _trouble("refused"),
-            lambda f: f"{f.where} refuses the connection: nothing listens on that TCP port",
-            _other_port),
-    ArmCase("tcp-unreachable", "no answer from that address",
-            _trouble("timeout", "unreachable"),
-            lambda f: f"{f.where} cannot be reached: {f.trouble}",
-            lambda f: f"check the address, the cable and the power of the controller: ping {f.host}"),
-    ArmCase("cannot-open", "the hardware interface cannot be opened",
-            lambda f: f.trouble, lambda f: f.trouble, lambda f: "change its options in the configuration"),
-    ArmCase("dashboard-port", "this is the dashboard server of Universal Robots, not RTDE",
-            lambda f: DASHBOARD.search(f.head),
-            lambda f: f"{f.where} is the dashboard server, which has no state of the arm",
-            lambda f: f"write --arm ur:{f.host}, which uses RTDE on port 30004"),
-    ArmCase("byte-order", "the controller has the other byte order",
-            lambda f: f.kind == "simple_message" and f.fault and _other_order(f),
-            lambda f: f"{f.where} sends statuses in the other byte order, {_other_order(f)} endian",
-            lambda f: f"write byte_order: {_other_order(f)} for '{f.name}' in the section 'hardware' of a --config"),
-    ArmCase("other-type", "this is simple_message, not RTDE",
-            lambda f: f.kind == "ur" and _other_order(f),
-            lambda f: f"{f.where} serves simple_message, not RTDE",
-            lambda f: f"write --arm simple_message:{f.where}"),
-    ArmCase("old-controller", "the controller does not have version 2 of RTDE",
-            lambda f: "too old" in f.fault,
-            lambda f: f"{f.where}: {f.fault}",
-            lambda f: "update the software of the controller"),
-    ArmCase("other-protocol", "another service answers on this port",
-            lambda f: f.fault and "it begins with" in f.fault,
-            lambda f: f"{f.size} bytes arrived from {f.where}, of another protocol: {_other_protocol(f)}",
-            _other_port),
-    ArmCase("not-understood", "the controller answers, but not as expected",
-            lambda f: f.fault,
-            lambda f: f"{f.where}: {f.fault}",
-            lambda f: "end other clients of the controller; if the fault remains, restart the controller"),
-    ArmCase("incomplete", "bytes arrive, but less than a whole answer: half a frame, or too slow",
-            lambda f: f.size,
-            lambda f: f"{f.size} bytes arrived from {f.where}, then {f.waits_for} did not",
-            lambda f: "check the network between: packet loss, MTU, a proxy; then restart the controller"),
-    ArmCase("tcp-silent", "the connection is open, and nothing arrives",
-            lambda f: f.port,
-            lambda f: f"{f.where} accepts the connection, but no byte arrives: {f.waits_for} did not arrive",
-            _other_port),
-    ArmCase("no-status", "a hardware interface of another package reports no status",
-            lambda f: True,
-            lambda f: f"no status arrived within {f.seconds:.1f} s",
-            lambda f: f"see the log above, and the documentation of '{f.kind}'"),
+    Case("ok", "a status is available",
+         lambda f: f.status is not None,
+         lambda f: "a status is available",
+         lambda f: f"mav-robot-status --arm {f.connection}" if f.port else "mav-robot-status with this --config"),
+    Case("unknown-name", "the name of the controller is unknown",
+         _trouble("unknown name"),
+         lambda f: f"the name {f.host} is unknown", lambda f: "check the name, or write the address"),
+    Case("tcp-refused", "nothing listens on that TCP port of the controller",
+         _trouble("refused"),
+         lambda f: f"{f.where} refuses the connection: nothing listens on that TCP port",
+         _other_port),
+    Case("tcp-unreachable", "no answer from that address",
+         _trouble("timeout", "unreachable"),
+         lambda f: f"{f.where} cannot be reached: {f.trouble}",
+         lambda f: f"check the address, the cable and the power of the controller: ping {f.host}"),
+    Case("cannot-open", "the hardware interface cannot be opened",
+         lambda f: f.trouble, lambda f: f.trouble, lambda f: "change its options in the configuration"),
+    Case("dashboard-port", "this is the dashboard server of Universal Robots, not RTDE",
+         lambda f: DASHBOARD.search(f.head),
+         lambda f: f"{f.where} is the dashboard server, which has no state of the arm",
+         lambda f: f"write --arm ur:{f.host}, which uses RTDE on port 30004"),
+    Case("byte-order", "the controller has the other byte order",
+         lambda f: f.kind == "simple_message" and f.fault and _other_order(f),
+         lambda f: f"{f.where} sends statuses in the other byte order, {_other_order(f)} endian",
+         lambda f: f"write byte_order: {_other_order(f)} for '{f.name}' in the section 'hardware' of a --config"),
+    Case("other-type", "this is simple_message, not RTDE",
+         lambda f: f.kind == "ur" and _other_order(f),
+         lambda f: f"{f.where} serves simple_message, not RTDE",
+         lambda f: f"write --arm simple_message:{f.where}"),
+    Case("old-controller", "the controller does not have version 2 of RTDE",
+         lambda f: "too old" in f.fault,
+         lambda f: f"{f.where}: {f.fault}",
+         lambda f: "update the software of the controller"),
+    Case("other-protocol", "another service answers on this port",
+         lambda f: f.fault and "it begins with" in f.fault,
+         lambda f: f"{f.size} bytes arrived from {f.where}, of another protocol: {_other_protocol(f)}",
+         _other_port),
+    Case("not-understood", "the controller answers, but not as expected",
+         lambda f: f.fault,
+         lambda f: f"{f.where}: {f.fault}",
+         lambda f: "end other clients of the controller; if the fault remains, restart the controller"),
+    Case("incomplete", "bytes arrive, but less than a whole answer: half a frame, or too slow",
+         lambda f: f.size,
+         lambda f: f"{f.size} bytes arrived from {f.where}, then {f.waits_for} did not",
+         lambda f: "check the network between: packet loss, MTU, a proxy; then restart the controller"),
+    Case("tcp-silent", "the connection is open, and nothing arrives",
+         lambda f: f.port,
+         lambda f: f"{f.where} accepts the connection, but no byte arrives: {f.waits_for} did not arrive",
+         _other_port),
+    Case("no-status", "a hardware interface of another package reports no status",
+         lambda f: True,
+         lambda f: f"no status arrived within {f.seconds:.1f} s",
+         lambda f: f"see the log above, and the documentation of '{f.kind}'"),
 )  # fmt: skip
 """In the order of evaluation. The last one always applies."""
 
 
 def arm_as_text(f: ArmFindings, diagnosis: Diagnosis) -> list[str]:
     """The diagnosis, the remarks and the next action, as lines."""
-    return [
-        f"{f.connection}: {diagnosis.matter} [{diagnosis.cause}]",
-        *(f"  {line}" for line in _remarks(f)),
-        f"next: {diagnosis.next}",
-    ]
+    return diagnosis.text(f.connection, _remarks(f))
 
 
 def arm_as_json(f: ArmFindings, diagnosis: Diagnosis) -> str:
-    """The same as a JSON object. Members and causes are stable; the wording of `found` and `next` is not."""
+    """The same as a JSON object."""
     return json.dumps(
         {
             "connection": f.connection,
             "handle": f.name,
-            "cause": diagnosis.cause,
-            "ok": diagnosis.ok,
-            "found": [diagnosis.matter, *_remarks(f)],
-            "next": diagnosis.next,
+            **diagnosis.members(_remarks(f)),
             "seconds": f.seconds,
             "bytes": f.size,
             "status": None

@@ -5,37 +5,32 @@ from __future__ import annotations
 import dataclasses
 import socket
 import time
-from typing import TYPE_CHECKING, Final, Protocol
+from collections.abc import Callable
+from typing import Final, Protocol
 
+from ...clock import Instant
 from ...clock import now as present
-from ...errors import LinkError
+from ...config import Config, HardwareConfig
+from ...errors import LinkError, ProtocolError
 from ...gateway.event_loop import EventLoop
 from ...hardware.simple_message.interface import SimpleMessageHardwareOptions
 from ...hardware.ur.interface import RATE, UrOptions
-from ...hardware.ur.rtde import ProtocolError, Session
+from ...hardware.ur.rtde import Session
 from ...hardware.ur.status import NAMES
-from ...interface import LinkState
-from ...simple_message import FrameError, StatusReader
+from ...interface import IndustrialRobotStatusHandle, LinkState
+from ...simple_message import StatusReader
 from ...streams import NO_OUTPUT
 from ..explain import silent
 from .arm_diagnosis import ArmFindings, diagnose_arm
 from .collector import HEAD
+from .diagnosis import Diagnosis
 from .probes import PATIENCE, tcp_trouble
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...clock import Instant
-    from ...config import Config, HardwareConfig
-    from ...interface import IndustrialRobotStatusHandle
-    from .diagnosis import Diagnosis
 
 SETTLE: Final = 1.5
 """Seconds from the first status until motion and the operational mode are known too."""
 ANSWER: Final = 3.0
 """Seconds for the controller to answer when it is asked again."""
 CHUNK: Final = 4096
-FAULTS: Final = (ProtocolError, FrameError)
 
 
 class Talk(Protocol):
@@ -45,7 +40,7 @@ class Talk(Protocol):
         """What to send next."""
 
     def hear(self, data: bytes) -> bool:
-        """Whether the status is complete. Raises one of FAULTS."""
+        """Whether the status is complete. Raises ProtocolError."""
 
     @property
     def waits_for(self) -> str:
@@ -164,7 +159,7 @@ def ask_again(found: ArmFindings, talk: Talk, answer: float = ANSWER) -> ArmFind
                 if not data or talk.hear(data):
                     break
                 controller.sendall(talk.ask())
-    except FAULTS as error:
+    except ProtocolError as error:
         fault = str(error)
     except OSError:  # it is silent, or has closed the connection: the bytes that arrived say more
         pass

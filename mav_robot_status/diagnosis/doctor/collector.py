@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping
+from typing import Final
 
+from ...clock import Instant
 from ...gateway.observer import Observer
 from ...hardware.mavlink.identity import is_autopilot
 from ...hardware.mavlink.state.applet import is_word, value_of
 from ...hardware.mavlink.state.high_latency import stated
+from ...links.base import Address
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
 from ...mavlink.counters import count as add
-from ...mavlink.framing import Parser
+from ...mavlink.framing import Frame, Parser
 from ...mavlink.wire import V1
-from .findings import HEARTBEAT, AppletReport, Speaker
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from ...clock import Instant
-    from ...links.base import Address
-    from ...mavlink.framing import Frame
-    from .findings import Findings, VehicleStatus
+from .findings import HEARTBEAT, AppletReport, Findings, Speaker, VehicleStatus
 
 HEAD: Final = 4096
 """Number of first bytes that are kept, to recognise other protocols."""

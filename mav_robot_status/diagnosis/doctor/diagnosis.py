@@ -6,10 +6,10 @@ The first case that applies is the diagnosis. A fault that hides other faults co
 from __future__ import annotations
 
 import errno
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Final, NamedTuple
 
-from mav_robot_status.values import NamedTuple
-
+from ...json_object import JsonObject
 from .advice import (
     OTHER_SYSTEM,
     available,
@@ -29,15 +29,11 @@ from .advice import (
     stream_sys_status,
     use_mavlink_2,
 )
-from .findings import LEAST_HEARTBEATS, SYS_STATUS
+from .findings import LEAST_HEARTBEATS, SYS_STATUS, Findings, Speaker
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+Test = Callable[[Any], object]
+Words = Callable[[Any], str]
 
-    from .findings import Findings, Speaker
-
-    Test = Callable[[Findings], object]
-    Words = Callable[[Findings], str]
 
 WRONG_CLOCK: Final = 5.0
 """Largest normal difference in seconds between a vehicle's clock and ours. A slow link delays by less."""
@@ -54,9 +50,17 @@ class Diagnosis(NamedTuple):
     next: str
     """The next action."""
 
+    def text(self, of: str, remarks: Iterable[str]) -> list[str]:
+        """The finding of a connection `of`, the remarks and the next action, as lines."""
+        return [f"{of}: {self.matter} [{self.cause}]", *(f"  {line}" for line in remarks), f"next: {self.next}"]
+
+    def members(self, remarks: Iterable[str]) -> JsonObject:
+        """The same in JSON. Members and causes are stable; the wording of `found` and `next` is not."""
+        return {"cause": self.cause, "ok": self.ok, "found": [self.matter, *remarks], "next": self.next}
+
 
 class Case(NamedTuple):
-    """One row of the table."""
+    """One row of a table: of MAVLink connections, arms or ROS 2. The functions get the findings there."""
 
     cause: str
     meaning: str
@@ -68,10 +72,15 @@ class Case(NamedTuple):
     """True if the fault makes an available status unreliable."""
 
 
+def first_case(cases: Sequence[Case], findings: object, able: bool) -> Diagnosis:
+    """The first case that applies. `able`: whether a status is available."""
+    case = next(case for case in cases if case.applies(findings))
+    return Diagnosis(case.cause, able and not case.spoils, case.matter(findings), case.next(findings))
+
+
 def diagnose(f: Findings) -> Diagnosis:
-    """The first case that applies."""
-    case = next(case for case in CASES if case.applies(f))
-    return Diagnosis(case.cause, f.able and not case.spoils, case.matter(f), case.next(f))
+    """The first case that applies to a MAVLink connection."""
+    return first_case(CASES, f, f.able)
 
 
 def _failed(*numbers: int) -> Test:

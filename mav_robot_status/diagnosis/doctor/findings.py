@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import Final, NamedTuple
 
+from ...hardware.mavlink.autopilots.wanted import Wanted
 from ...hardware.mavlink.identity import named
 from ...hardware.mavlink.senders import LATE, Sender, Strangers
 from ...hardware.mavlink.state.applet import FRESH
+from ...links.url import Url
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters
-from ...values import NamedTuple
 from .heard import Heard
-
-if TYPE_CHECKING:
-    from ...hardware.mavlink.autopilots.wanted import Wanted
-    from ...links.url import Url
 
 HEARTBEAT, SYS_STATUS, HIGH_LATENCY2 = 0, 1, 235
 GROUND_STATION: Final = 6  # MAV_TYPE

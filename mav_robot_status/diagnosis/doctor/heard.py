@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, NamedTuple
 
+from ...clock import Instant
 from ...gateway.observer import Observer
-from ...interface import STATES, LinkState
-from ...values import NamedTuple
-
-if TYPE_CHECKING:
-    from ...clock import Instant
-    from ...interface import IndustrialRobotStatusHandle, IndustrialRobotStatusInterface
+from ...interface import STATES, IndustrialRobotStatusHandle, IndustrialRobotStatusInterface, LinkState
 
 FRESH: Final = 1.5
 """Seconds for which a status counts as that at the latest heartbeat. Then its fields become unknown one by one."""

@@ -7,40 +7,36 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Iterator
+from typing import Final
 
+from ...clock import Instant
 from ...clock import now as present
+from ...config import Config, LinkConfig
 from ...errors import LinkError
 from ...gateway.event_loop import EventLoop
-from ...gateway.recorded_log import Recording
+from ...gateway.logs.recorded_log import Recording
 from ...gateway.replay import ReplayPipeline, run_through
 from ...hardware.mavlink.autopilots.wanted import COMMON
+from ...hardware.mavlink.interface import MavlinkRobotHW
 from ...hardware.mavlink.requests.message_intervals import LOOK, wanted_of
 from ...hardware.mavlink.senders import senders, strangers
+from ...hardware.mavlink.vehicle import TrackedVehicle
 from ...interface.explanation import explanation
+from ...links.log import Stamped
 from ...links.url import parse
 from ...mavlink.component import DEFAULT_SYSTEM, Component
+from ...mavlink.counters import Counters
 from ...mavlink.framing import Frame, Parser
 from ...streams import NO_OUTPUT
-from .. import applet
 from ..explain import silent
+from ..vehicle_reports import can_run
 from . import probes
 from .advice import protocol
 from .collector import Collector
-from .diagnosis import diagnose
+from .diagnosis import Diagnosis, diagnose
 from .findings import Findings, Trouble, VehicleStatus
 from .heard import Listener
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from ...clock import Instant
-    from ...config import Config, LinkConfig
-    from ...hardware.mavlink.interface import MavlinkRobotHW
-    from ...hardware.mavlink.vehicle import TrackedVehicle
-    from ...links.log import Stamped
-    from ...mavlink.counters import Counters
-    from .diagnosis import Diagnosis
 
 LISTEN: Final = 5.0
 """Seconds to listen. They start again at the first heartbeat, because missing messages are requested 3 s later."""
@@ -183,7 +179,7 @@ def _status(hw: MavlinkRobotHW, tracked: TrackedVehicle, now: Instant) -> Vehicl
         explained["vehicle"].get("firmware"),
         costly=tracked.costly,
         name=tracked.name,
-        can_run_applet=applet.can_run(state) and not tracked.costly,
+        can_run_applet=can_run(state) and not tracked.costly,
         senders=senders(tracked.belief, now.mono),
         strangers=strangers(tracked.belief, now.mono, hw.options.heartbeat_timeout),
     )

@@ -10,24 +10,20 @@ import select
 import socket
 import struct
 import time
+from collections.abc import Iterable
 from contextlib import ExitStack, suppress
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ...errors import LinkError
+from ...json_object import JsonObject
+from ...links.base import Link
 from ...links.guarded import open_guarded
 from ...links.owner import device_owner
 from ...links.serial import SHARED
-from ...links.url import parse
+from ...links.url import Url, parse
 from ...mavlink.framing import Parser
 from .advice import EVERY_ADDRESS
 from .findings import Place
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from ...json_object import JsonObject
-    from ...links.base import Link
-    from ...links.url import Url
 
 USUAL_PORTS: Final = (14550, 14540, 14551, 14552, 14560, 14445)
 """UDP ports that autopilots, simulators and routers send to by default."""

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 from ...clock import rfc3339
 from ...hardware.mavlink.identity import named
+from ...json_object import JsonObject
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_PX4
 from .advice import applet_heard, listed, named_all
-from .findings import GROUND_STATION
-from .heard import duration
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from ...json_object import JsonObject
-    from .diagnosis import Diagnosis
-    from .findings import Findings, Speaker
-    from .heard import Heard
+from .diagnosis import Diagnosis
+from .findings import GROUND_STATION, Findings, Speaker
+from .heard import Heard, duration
 
 FEW_SOURCES = 4
 """Limit of addresses in the text. The JSON has all."""
@@ -28,23 +22,16 @@ FEW_SOURCES = 4
 
 def as_text(f: Findings, diagnosis: Diagnosis) -> list[str]:
     """The diagnosis, the remarks and the next action, as lines."""
-    return [
-        f"{f.words}: {diagnosis.matter} [{diagnosis.cause}]",
-        *(f"  {line}" for line in remarks(f)),
-        f"next: {diagnosis.next}",
-    ]
+    return diagnosis.text(f.words, remarks(f))
 
 
 def as_json(f: Findings, diagnosis: Diagnosis) -> str:
-    """The same as a JSON object. Members and causes are stable; the wording of `found` and `next` is not."""
+    """The same as a JSON object."""
     c = f.counters
     return json.dumps(
         {
             "connection": f.url.text,
-            "cause": diagnosis.cause,
-            "ok": diagnosis.ok,
-            "found": [diagnosis.matter, *remarks(f)],
-            "next": diagnosis.next,
+            **diagnosis.members(remarks(f)),
             "seconds": f.seconds,
             "bytes": f.size,
             "frames": c.frames,

@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Final
+from typing import Final, NamedTuple
 
 from ...publishers.ros.messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS
 from ...publishers.ros.publisher import extra_of
-from ...publishers.ros.settings import DDS, ZENOH
+from ...publishers.ros.settings import DDS, ZENOH, Ros2Settings
 from ...publishers.ros.transport import Endpoint, UnreachableError
-from ...values import NamedTuple
-from .diagnosis import Diagnosis
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...publishers.ros.settings import Ros2Settings
+from .diagnosis import Case, Diagnosis, first_case
 
 TYPES: Final = {kind.dds_name: kind for kind in (ROBOT_STATUS, DIAGNOSTIC_ARRAY)}
 MOST_SHOWN: Final = 8
@@ -42,18 +36,6 @@ class Ros2Findings(NamedTuple):
         return tuple(one for one in self.here if not _is_ours(one))
 
 
-class Ros2Case(NamedTuple):
-    """One row of the table."""
-
-    cause: str
-    meaning: str
-    """The row of the reference page."""
-    ok: bool
-    applies: Callable[[Ros2Findings], object]
-    matter: Callable[[Ros2Findings], str]
-    next: Callable[[Ros2Findings], str]
-
-
 def _echo(f: Ros2Findings) -> str:
     rmw = "RMW_IMPLEMENTATION=rmw_zenoh_cpp " if f.settings.middleware == ZENOH else ""
     domain = f"ROS_DOMAIN_ID={f.settings.domain} " if f.settings.domain else ""
@@ -61,28 +43,31 @@ def _echo(f: Ros2Findings) -> str:
 
 
 CASES: Final = (
-    Ros2Case("ros2-unreachable", "the Zenoh router, or the DDS domain, cannot be reached", False,
-             lambda f: f.trouble,
-             lambda f: f.trouble or "",
-             lambda f: "start the router there (ros2 run rmw_zenoh_cpp rmw_zenohd), or write its address"
-             if f.settings.middleware == ZENOH else "check CYCLONEDDS_URI and the network interface"),
-    Ros2Case("ros2-other-domain", "there are subscribers, but in another ROS domain", False,
-             lambda f: f.subscriptions and not f.here,
-             lambda f: f"nobody subscribes in domain {f.settings.domain}, but somebody does in domain "
-             f"{f.subscriptions[0].domain}",
-             lambda f: f"write zenoh://{f.settings.host}:{f.settings.port}/{f.subscriptions[0].domain}"),
-    Ros2Case("ros2-no-subscriber", "nobody subscribes yet; the topics are available", True,
-             lambda f: not f.here,
-             lambda f: f"it can be reached, but nobody subscribes in domain {f.settings.domain}",
-             lambda f: f"{_echo(f)}, on the computer that should show it"),
-    Ros2Case("ros2-other-definition", "a subscriber has another definition of the message and receives nothing", False,
-             lambda f: f.foreign,
-             lambda f: f"{_named(f.foreign[0])} has another definition of the message",
-             lambda f: "let it use industrial_msgs of the branch ros2 of industrial_core, and ROS 2's diagnostic_msgs"),
-    Ros2Case("ros2-ok", "somebody subscribes", True,
-             lambda f: True,
-             lambda f: f"subscribers in domain {f.settings.domain}: {len(f.here)}",
-             lambda f: "nothing: the topics are received"),
+    Case("ros2-unreachable", "the Zenoh router, or the DDS domain, cannot be reached",
+         lambda f: f.trouble,
+         lambda f: f.trouble or "",
+         lambda f: "start the router there (ros2 run rmw_zenoh_cpp rmw_zenohd), or write its address"
+         if f.settings.middleware == ZENOH else "check CYCLONEDDS_URI and the network interface",
+         spoils=True),
+    Case("ros2-other-domain", "there are subscribers, but in another ROS domain",
+         lambda f: f.subscriptions and not f.here,
+         lambda f: f"nobody subscribes in domain {f.settings.domain}, but somebody does in domain "
+         f"{f.subscriptions[0].domain}",
+         lambda f: f"write zenoh://{f.settings.host}:{f.settings.port}/{f.subscriptions[0].domain}",
+         spoils=True),
+    Case("ros2-no-subscriber", "nobody subscribes yet; the topics are available",
+         lambda f: not f.here,
+         lambda f: f"it can be reached, but nobody subscribes in domain {f.settings.domain}",
+         lambda f: f"{_echo(f)}, on the computer that should show it"),
+    Case("ros2-other-definition", "a subscriber has another definition of the message and receives nothing",
+         lambda f: f.foreign,
+         lambda f: f"{_named(f.foreign[0])} has another definition of the message",
+         lambda f: "let it use industrial_msgs of the branch ros2 of industrial_core, and ROS 2's diagnostic_msgs",
+         spoils=True),
+    Case("ros2-ok", "somebody subscribes",
+         lambda f: True,
+         lambda f: f"subscribers in domain {f.settings.domain}: {len(f.here)}",
+         lambda f: "nothing: the topics are received"),
 )  # fmt: skip
 """In the order of evaluation. The last one always applies."""
 
@@ -104,30 +89,21 @@ def examine(settings: Ros2Settings) -> Ros2Findings:
 
 def diagnose(f: Ros2Findings) -> Diagnosis:
     """The first case that applies."""
-    case = next(case for case in CASES if case.applies(f))
-    return Diagnosis(case.cause, case.ok, case.matter(f), case.next(f))
+    return first_case(CASES, f, able=True)
 
 
 def as_text(f: Ros2Findings, diagnosis: Diagnosis) -> list[str]:
     """The diagnosis, the subscriptions and the next action, as lines."""
-    more = [f"  and {len(f.subscriptions) - MOST_SHOWN} more"] if len(f.subscriptions) > MOST_SHOWN else []
-    return [
-        f"{f.settings.name}: {diagnosis.matter} [{diagnosis.cause}]",
-        *(f"  {_named(one)}" for one in f.subscriptions[:MOST_SHOWN]),
-        *more,
-        f"next: {diagnosis.next}",
-    ]
+    more = [f"and {len(f.subscriptions) - MOST_SHOWN} more"] if len(f.subscriptions) > MOST_SHOWN else []
+    return diagnosis.text(f.settings.name, [*map(_named, f.subscriptions[:MOST_SHOWN]), *more])
 
 
 def as_json(url: str, f: Ros2Findings, diagnosis: Diagnosis) -> str:
-    """The same as a JSON object. Members and causes are stable; the wording of `found` and `next` is not."""
+    """The same as a JSON object."""
     return json.dumps(
         {
             "ros2": url,
-            "cause": diagnosis.cause,
-            "ok": diagnosis.ok,
-            "found": [diagnosis.matter, *map(_named, f.subscriptions)],
-            "next": diagnosis.next,
+            **diagnosis.members(map(_named, f.subscriptions)),
             "domain": f.settings.domain,
             "subscriptions": [one._asdict() for one in f.subscriptions],
         }

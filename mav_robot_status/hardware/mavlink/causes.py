@@ -6,7 +6,7 @@ Codes are stable: they are never reused, and new ones are appended.
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final
+from typing import Final, NamedTuple
 
 from ...interface.status import ErrorCause
 from ...mavlink.definitions import EXTENDED_SENSOR_NAMES, SENSOR_NAMES, SEVERITY_NAMES
@@ -18,7 +18,6 @@ from ...mavlink.enumerations import (
     MAV_SYS_STATUS_SENSOR_RC_RECEIVER,
     MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL,
 )
-from ...values import NamedTuple
 
 FLIGHT_TERMINATION: Final = 1001
 TERMINATION_ANNOUNCED: Final = 1002

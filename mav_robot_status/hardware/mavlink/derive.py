@@ -7,12 +7,11 @@ motion_possible FALSE. I3 error_code != 0 <=> in_error TRUE. I4 link stale => ev
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...interface.fields import STATES
 from ...interface.status import Detail, Inhibit, LinkState, RobotMode, RobotStatus, Vehicle
 from ...mavlink.definitions import AUTOPILOT_NAMES, STATE_NAMES, TYPE_NAMES
-from ...values import NamedTuple
 from . import causes
 from .identity import named
 from .rules import high_latency

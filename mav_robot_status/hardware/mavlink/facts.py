@@ -6,11 +6,10 @@ facts, because each message changes them; `evidence` reads them from the state.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...interface.status import TriState
 from ...mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from ...mavlink.definitions import Heartbeat
@@ -73,6 +72,8 @@ class Outputs(NamedTuple):
     """Whether they are held at their stop value, for long enough, while throttle is demanded."""
     at_stop: bool
     """Whether each is at its stop value: then a turning motor is not driven."""
+    idle: bool
+    """Whether they stand at their stop value while throttle is demanded, without a proof that they are motors."""
 
 
 class Stop(NamedTuple):
@@ -84,6 +85,8 @@ class Stop(NamedTuple):
     """Whether the pre-arm checks, which fail while it is engaged, pass."""
     doubt: str | None
     """Why a stop may last, although no evidence of it counts any more."""
+    unexplained: bool
+    """Whether it was disarmed in motion, and frames that may tell why are lost."""
 
 
 class Applet(NamedTuple):

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from enum import Enum
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface.status import TriState
 from ...mavlink import enumerations as mavlink
-from ...values import NamedTuple
 from . import causes
 from .autopilots.sensor_weights import bit_of
 from .identity import sensor_name

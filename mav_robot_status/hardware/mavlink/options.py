@@ -6,12 +6,11 @@ The annotations are the schema from which the configuration is read and checked:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
-from typing import Annotated, Final, Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Final, Literal, NamedTuple
 
 from ...interface import RobotMode
 from ...mavlink.definitions import EXTENDED_SENSOR_NAMES, SENSOR_NAMES
-from ...values import NamedTuple, dataclass
 
 
 class Within(NamedTuple):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...mavlink.definitions import TYPE_NAMES
-from ...values import NamedTuple
 from .armed import is_armed
 from .belief.speakers import HOLD, differ
 from .identity import named

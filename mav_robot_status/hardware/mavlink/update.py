@@ -24,6 +24,7 @@ from .senders import LATE, stranger
 from .settle import facts_of
 from .settle.table import UNDISPUTED
 from .state import estop, motion
+from .state.heartbeat_history import missed
 from .state.high_latency import stated, tells_armed
 from .state.vehicle_state import VehicleState, begin, timeout_of
 
@@ -70,7 +71,10 @@ def on_frame(
     if speaker is None:
         return heard
     _arrived(tracked, speaker, frame[3], now.mono, options)
-    if said is not None:
+    if said is None:
+        if type(frame[3]) is Heartbeat and speaker.state is not None:  # late, and armed
+            speaker.state.told_armed = now.mono
+    else:
         _use(tracked, speaker, frame[0], frame[3], said, options)
         if tracked.belief.changes:
             _apply_changes(tracked, now, options)
@@ -83,10 +87,14 @@ def _arrived(tracked: TrackedVehicle, speaker: Speaker, message: Any, at: float,
     if state is None:
         return
     is_heartbeat = type(message) is Heartbeat and is_autopilot(message, tracked.component)
-    if is_heartbeat or at - state.arrived <= timeout_of(state, options):
+    timeout, beat = timeout_of(state, options), state.latest.heartbeat
+    if is_heartbeat or at - state.arrived <= timeout:
         state.arrived = max(at, state.arrived)
+        if beat is not None and speaker.said_at - beat.at > timeout:
+            state.heartbeats = missed(state.heartbeats, at)
     if speaker.lost_since is not None:
         state.stop = estop.lost(state.stop, speaker.lost_since)
+        state.note_loss(speaker.lost_since)
         speaker.lost_since = None
 
 
@@ -101,7 +109,7 @@ def _apply_changes(tracked: TrackedVehicle, now: Instant, options: HardwareOptio
                 speaker.newest.clear()
             for message_id, message, said in change.kept:
                 newest = speaker.newest.get(message_id, -math.inf)
-                if message_id in SAID_ONCE or said.mono > newest:
+                if message_id in SAID_ONCE or said.mono >= newest:
                     speaker.newest[message_id] = max(said.mono, newest)
                     _arrived(tracked, speaker, message, said.mono, options)
                     _use(tracked, speaker, message_id, message, said, options)

@@ -5,13 +5,11 @@ A controller may send any number. What has no meaning is UNKNOWN, and so are two
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ...interface import Detail, ErrorCause, Evidence, Inhibit, RobotMode, RobotStatus, TriState, Vehicle
-from ...values import NamedTuple
-
-if TYPE_CHECKING:
-    from ...simple_message import StatusFrame
+from ...simple_message import StatusFrame
+from ..tcp_arm import Values
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 TRI_STATES: Final = {state.value: state for state in TriState}
@@ -21,14 +19,6 @@ CONTROLLER: Final = "SIMPLE_MESSAGE"
 """`vehicle.autopilot`: the frame does not say which controller it is."""
 NO_CODE: Final = 8000
 """The error code of a controller that reports an error without a code."""
-
-
-class Values(NamedTuple):
-    """The values for a handle."""
-
-    status: RobotStatus
-    detail: Detail
-    evidence: dict[str, Evidence]
 
 
 def status_of(frame: StatusFrame) -> RobotStatus:

@@ -8,14 +8,12 @@ Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide".
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from struct import Struct
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, NamedTuple
 
-from mav_robot_status.values import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from ...errors import ProtocolError
 
 HEADER: Final = Struct(">HB")
 PROTOCOL: Final = 2
@@ -39,10 +37,6 @@ TYPES: Final = {
 NOT_FOUND: Final = "NOT_FOUND"
 FIRMWARE: Final = Struct(">IIII")
 RATE: Final = Struct(">d")
-
-
-class ProtocolError(Exception):
-    """The peer does not speak RTDE as expected. The text says why; the connection is of no use any more."""
 
 
 class Recipe(NamedTuple):

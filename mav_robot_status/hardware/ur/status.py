@@ -7,8 +7,9 @@ Universal Robots' ROS driver, which leaves in_motion unknown and error_code 0.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, NamedTuple
 
 from ...interface import (
     Detail,
@@ -20,10 +21,7 @@ from ...interface import (
     TriState,
     Vehicle,
 )
-from ...values import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+from ..tcp_arm import Values
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 
@@ -137,14 +135,6 @@ class Joints:
         elif self.slow_since is not None and now >= self.slow_since + SUSTAIN_OFF:
             self.value = FALSE
         return self.value
-
-
-class Values(NamedTuple):
-    """The values for a handle."""
-
-    status: RobotStatus
-    detail: Detail
-    evidence: dict[str, Evidence]
 
 
 class Context(NamedTuple):

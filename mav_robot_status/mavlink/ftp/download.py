@@ -16,9 +16,7 @@ from __future__ import annotations
 import math
 import struct
 from enum import Enum
-from typing import Final
-
-from mav_robot_status.values import NamedTuple
+from typing import Final, NamedTuple
 
 from .payload import (
     ACK,

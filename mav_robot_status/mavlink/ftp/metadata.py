@@ -10,9 +10,7 @@ from __future__ import annotations
 import json
 import re
 import zlib
-from typing import Final
-
-from mav_robot_status.values import NamedTuple
+from typing import Final, NamedTuple
 
 from .download import Failure
 

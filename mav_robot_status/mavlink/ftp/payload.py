@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping
+from typing import Final, NamedTuple
 
-from ...values import NamedTuple
 from ..definitions import FileTransferProtocol
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 HEADER: Final = struct.Struct("<HBBBBBxI")
 PAYLOAD: Final = 251

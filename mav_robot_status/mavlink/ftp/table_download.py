@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from .download import Download, Failure
 from .metadata import MOST_GENERAL, MOST_GENERAL_TEXT, MOST_TABLE, Place, has_crc, place, table_place
-
-if TYPE_CHECKING:
-    from .payload import Payload
+from .payload import Payload
 
 STEP: Final = 1000
 """How far the sequence numbers of two files are apart: a late answer about the first is not taken for the second."""

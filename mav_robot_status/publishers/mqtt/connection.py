@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import random
 import ssl
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from collections.abc import Callable
+from typing import Any, Final, Protocol
 
 from paho.mqtt.client import MQTT_ERR_SUCCESS, Client, MQTTMessage
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
 
-from .client import dial, make, shut
-from .reasons import lost, refusal, words
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from paho.mqtt.reasoncodes import ReasonCode
-
-    from ..error_reporter import ErrorReporter
-    from .client import Will
-    from .settings import Broker
+from ..error_reporter import ErrorReporter
+from .client import Will, dial, lost, make, refusal, shut, words
+from .settings import Broker
 
 FIRST_WAIT, LONGEST_WAIT = 1.0, 30.0  # s between two attempts; doubled each time, with jitter
 STEADY: Final = 10.0  # s after which a connection counts as steady and the wait is reset

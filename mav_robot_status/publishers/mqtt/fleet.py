@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from ...clock import rfc3339
+from ...clock import Instant, rfc3339
+from ...json_object import JsonObject
 from .lines import unknown
 from .robot import BROKEN, OFFLINE, ONLINE
-
-if TYPE_CHECKING:
-    from ...clock import Instant
-    from ...json_object import JsonObject
 
 MOST_ROBOTS: Final = 4096
 LONGEST: Final = 65_536  # bytes of a status or an event

@@ -15,13 +15,11 @@ import os
 import queue
 import threading
 import zlib
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator
+from typing import Final
 
 from ...errors import LinkError
 from .spool import Event
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 log = logging.getLogger(__name__)
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ...clock import rfc3339
-from ...interface import FIELDS, RobotStatus
-from ..json_lines import native, native_body
-
-if TYPE_CHECKING:
-    from ...interface import RobotStatusMsg
-    from ...json_object import JsonMapping, JsonObject
+from ...interface import FIELDS, RobotStatus, RobotStatusMsg
+from ...json_object import JsonMapping, JsonObject
+from ..json_lines import members, native, native_body
 
 UNKNOWN: Final[JsonObject] = {
     **{field.name: field.plain(value) for field, value in zip(FIELDS, RobotStatus(), strict=True)},
@@ -72,7 +68,7 @@ def event_of(msg: RobotStatusMsg, old: JsonMapping, new: JsonMapping, robot: str
 
 def members_of(msg: RobotStatusMsg) -> JsonObject:
     """The members that can change. Those of `vehicle` and `link` have names like `vehicle.flight_mode`."""
-    line = json.loads("{" + native_body(msg.handle, msg.status, msg.detail) + "}}")
+    line = members(msg.handle, msg.status, msg.detail)
     groups = {"vehicle": msg.detail.vehicle._asdict(), "link": line.pop("link")}
     for name in ("handle", "system", "component", "vehicle"):
         del line[name]

@@ -5,14 +5,11 @@ from __future__ import annotations
 import re
 import socket
 import string
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ...errors import UsageError
-from ...interface import LinkState
+from ...interface import LinkState, RobotStatusMsg
 from ...interface.options import short
-
-if TYPE_CHECKING:
-    from ...interface import RobotStatusMsg
 
 PLACES: Final = ("system", "component", "handle", "host", "serial")
 SERIALS: Final = ("/sys/firmware/devicetree/base/serial-number", "/etc/machine-id")

@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Final
 from ...clock import now as present
 from ...errors import UsageError
 from ...extras import install
+from ...interface import Detail, Publisher, PublisherContext, RobotStatus, RobotStatusMsg
 from .lines import event_of, members_of
 from .naming import Naming
-from .options import MqttOptions
-from .settings import read
+from .settings import MqttOptions, read
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ...clock import Instant
-    from ...interface import Detail, PublisherContext, RobotStatus, RobotStatusMsg
     from ...json_object import JsonObject
     from .worker import Worker
 
@@ -45,7 +44,7 @@ class _Published:
         """When (monotonic seconds) its last status was handed over."""
 
 
-class MqttPublisher:
+class MqttPublisher(Publisher):
     """Statuses, events and connection states of robots on an MQTT broker.
 
     Options: see docs/reference/mqtt.md. Raises UsageError for a wrong option and if the extra is not installed,
@@ -79,10 +78,6 @@ class MqttPublisher:
         if not context.patient:
             self._worker = worker.Worker(options, clock)
             self._worker.start()
-
-    def busy(self) -> bool:
-        """Never: only the latest status counts, and events wait on disk."""
-        return False
 
     @property
     def queued(self) -> int:

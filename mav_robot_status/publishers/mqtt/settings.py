@@ -1,27 +1,63 @@
-"""The settings of an MQTT output: the broker, the credentials, the names of robots, the file of undelivered events."""
+"""The options of an MQTT output: the broker, the credentials, the names of robots, the file of undelivered events."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import ssl
-from stat import S_IRWXG, S_IRWXO
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
-from ...interface.options import short
-from ...values import NamedTuple
+from ...interface.options import Option, Options, short
+from ...user_files import read_secret, state_folder
 from .naming import places
-from .options import DEFAULT_ROBOT, BrokerOptions, MqttOptions
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 EXAMPLE: Final = "mqtts://broker.example/robots"
 PASSWORD: Final = "MAV_ROBOT_STATUS_MQTT_PASSWORD"
 """The environment variable with the password."""
 PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
+
+
+VERSIONS: Final = {"5": 5, "3.1.1": 4}
+"""The versions as people write them, with the protocol level of each."""
+DEFAULT_ROBOT: Final = "{host}-{system}"
+
+
+@dataclass(frozen=True)
+class BrokerOptions(Options):
+    """How to connect to a broker."""
+
+    url: Annotated[
+        str, Option("publish statuses and events to a broker, for example mqtts://broker/robots", "--mqtt", "URL")
+    ] = ""
+    user: Annotated[str | None, Option("user name at the broker", "--mqtt-user", "NAME")] = None
+    password_file: Annotated[
+        str | None,
+        Option("file with the password; without it, MAV_ROBOT_STATUS_MQTT_PASSWORD", "--mqtt-password-file", "FILE"),
+    ] = None
+    ca: Annotated[str | None, Option("trusted CA (PEM), instead of the system's", "--mqtt-ca", "FILE")] = None
+    cert: Annotated[str | None, Option("client certificate (PEM)", "--mqtt-cert", "FILE")] = None
+    key: Annotated[str | None, Option("client key (PEM), if it is in another file", "--mqtt-key", "FILE")] = None
+    version: Annotated[str, Option("protocol version (5)", "--mqtt-version", choices=tuple(VERSIONS))] = "5"
+    keepalive: Annotated[
+        float,
+        Option("seconds until a broken connection is noticed (10)", "--mqtt-keepalive", "S", low=2, high=3600),
+    ] = 10.0
+
+
+@dataclass(frozen=True)
+class MqttOptions(BrokerOptions):
+    """The options of the publisher `mqtt`."""
+
+    robot: Annotated[str, Option("name of a robot on its topics ({host}-{system})", "--mqtt-robot", "NAME")] = (
+        DEFAULT_ROBOT
+    )
+    spool: Annotated[str | None, Option("file of undelivered events", "--mqtt-spool", "FILE")] = None
+    spool_size: Annotated[float, Option("size limit of undelivered events, megabytes", low=0.01, high=100_000)] = 64.0
+    spool_age: Annotated[float, Option("age limit of an undelivered event, days", low=0.001, high=3650)] = 7.0
 
 
 class Broker(NamedTuple):
@@ -88,11 +124,8 @@ def _broker(options: BrokerOptions, environment: Mapping[str, str]) -> Broker:
 
 def default_spool(broker: Broker, environment: Mapping[str, str]) -> str:
     """The default spool: in systemd's StateDirectory, else in the user's state folder (XDG)."""
-    folder = environment.get("STATE_DIRECTORY", "").partition(":")[0] or os.path.join(
-        environment.get("XDG_STATE_HOME") or "~/.local/state", "mav-robot-status"
-    )
     mark = hashlib.sha256(f"{broker.name}/{broker.prefix}".encode()).hexdigest()[:12]
-    return os.path.join(folder, f"mqtt-{mark}.sqlite")
+    return os.path.join(state_folder(environment), f"mqtt-{mark}.sqlite")
 
 
 def _address(url: str) -> tuple[bool, str, int, str]:
@@ -119,14 +152,7 @@ def _address(url: str) -> tuple[bool, str, int, str]:
 def _password(file: str | None, environment: Mapping[str, str]) -> str | None:
     if not file:
         return environment.get(PASSWORD) or None
-    name = os.path.expanduser(file)
-    try:
-        with open(name, "rb") as opened:
-            if os.fstat(opened.fileno()).st_mode & (S_IRWXG | S_IRWXO):
-                raise UsageError(f"{name}: other users can read or change this password: chmod 600 {name}")
-            data = opened.read(65536)
-    except (OSError, ValueError) as error:
-        raise UsageError(f"{name}: cannot read the password: {_why(error)}") from None
+    name, data = read_secret(file, "password", 65536)
     text = data.decode("utf-8", "replace").rstrip("\r\n")
     if not text or "\n" in text or "\0" in text:
         raise UsageError(f"{name}: the password must be one line")

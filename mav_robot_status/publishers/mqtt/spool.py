@@ -13,15 +13,12 @@ import math
 import os
 import sqlite3
 from collections import Counter, deque
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable, Iterator
+from typing import Any, Final, NamedTuple
 
 from ...errors import LinkError
-from ...values import NamedTuple
 from .naming import level
 from .spool_file import DEFECT, FULL, MEMORY, connect, is_damaged, says, set_aside
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 log = logging.getLogger(__name__)
 

@@ -6,22 +6,19 @@ import contextlib
 import logging
 import threading
 from collections import Counter, deque
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
+from ...clock import Instant
 from ...errors import LinkError
+from ...interface import RobotStatusMsg
 from ..error_reporter import ErrorReporter
 from .journal import Journal
 from .lines import line_of
 from .loop import Loop
 from .robot import Robot
+from .settings import MqttSettings
 from .spool import Event, Spool
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...clock import Instant
-    from ...interface import RobotStatusMsg
-    from .settings import MqttSettings
 
 log = logging.getLogger(__name__)
 

@@ -6,10 +6,9 @@ Levels follow diagnostic_msgs/msg/DiagnosticStatus. rqt_robot_monitor, Foxglove 
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import FIELDS, STATES, LinkState, TriState
-from ...values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

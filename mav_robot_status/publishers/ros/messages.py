@@ -6,10 +6,9 @@ does not receive. Tests compare bytes and hashes with those of `rosbags`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import FIELDS, Kind
-from ...values import NamedTuple
 from ..json_lines import error_codes
 from .cdr import Encoder
 from .diagnostics import diagnostic_status

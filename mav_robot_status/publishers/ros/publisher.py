@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 from ...clock import now as present
 from ...errors import UsageError
 from ...extras import install
-from .options import Ros2Options
-from .settings import DDS, read
+from .settings import DDS, Ros2Options, read
 from .worker import Gone, Worker
 
 if TYPE_CHECKING:

@@ -1,16 +1,15 @@
-"""The settings of a ROS 2 output: the middleware, its address and domain, the names of the topics."""
+"""The options and settings of a ROS 2 output: the middleware, its address and domain, the names of the topics."""
 
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
-from ...interface.options import short
-from ...values import NamedTuple
+from ...interface.options import Option, Options, short
 from .naming import DIAGNOSTICS, is_name
-from .options import Ros2Options
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,6 +21,18 @@ LAST_DOMAIN: Final = 232
 DOMAIN: Final = "ROS_DOMAIN_ID"
 """The environment variable with the domain that every ROS 2 program uses."""
 FORMS: Final = "write zenoh://127.0.0.1:7447 for a Zenoh router, or dds://0 for the DDS domain 0"
+
+
+@dataclass(frozen=True)
+class Ros2Options(Options):
+    """The options of the publisher `ros2`."""
+
+    url: Annotated[
+        str, Option("publish ROS 2 topics: zenoh://127.0.0.1:7447 or dds://0, the DDS domain", "--ros2", "URL")
+    ] = ""
+    namespace: Annotated[str, Option("namespace of the ROS 2 topics and node", "--ros2-namespace", "NAME")] = ""
+    topic: Annotated[str, Option("name of the topic of each robot")] = "robot_status"
+    rate: Annotated[float, Option("messages a second on each topic if nothing changes, Hz", low=0, high=1000)] = 1.0
 
 
 class Ros2Settings(NamedTuple):

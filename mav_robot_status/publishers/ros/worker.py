@@ -6,10 +6,9 @@ import logging
 import random
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import Inhibit, LinkState, RobotStatus, RobotStatusMsg
-from ...values import NamedTuple
 from ..error_reporter import ErrorReporter
 from .messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS, diagnostic_array, robot_status
 from .naming import DIAGNOSTICS, Topics

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 from ...errors import UsageError
 from ...interface.options import Option, Options, short
 from ...simple_message import ORDERS, STATE_PORT
 from ..listener import LAST_PORT, place
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 NAME: Final = "simple_message"
 DEFAULT_HOST: Final = "127.0.0.1"

@@ -5,17 +5,15 @@ from __future__ import annotations
 import logging
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from ...clock import Instant
+from ...interface import Publisher, PublisherContext, RobotStatusMsg
 from ...simple_message import StatusEncoder
 from ..listener import listen
 from .options import NAME, SimpleMessageOptions, read
 from .requests import RequestReader
 from .server import MOST_CLIENTS, SOCKET_OPTIONS, Server
-
-if TYPE_CHECKING:
-    from ...clock import Instant
-    from ...interface import PublisherContext, RobotStatusMsg
 
 log = logging.getLogger(__name__)
 
@@ -23,8 +21,8 @@ LOOK: Final = 0.1
 """Seconds between two looks at the clients. It bounds what a flood costs: a client that sends more has to wait."""
 
 
-class SimpleMessagePublisher:
-    """A TCP server that sends the status of one handle to every client.
+class SimpleMessagePublisher(Publisher):
+    """A TCP server that sends the status of one handle to every client. A client without room is disconnected.
 
     Raises UsageError for a wrong option, LinkError if the port is in use.
     """
@@ -50,10 +48,6 @@ class SimpleMessagePublisher:
     def dropped(self) -> int:
         """Frames that did not fit into the buffer of a client. Each disconnected its client."""
         return self._server.dropped
-
-    def busy(self) -> bool:
-        """Never: a client without room is disconnected."""
-        return False
 
     def publish(self, msg: RobotStatusMsg) -> None:
         """Send the status to every client."""

@@ -6,15 +6,13 @@ import logging
 import select
 import socket
 import struct
+from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from ...paced_log import PacedLog
 from ..listener import host_port
 from .requests import RequestReader
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 log = logging.getLogger(__name__)
 

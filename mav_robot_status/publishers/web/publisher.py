@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 from ...errors import UsageError
 from ...extras import install
 from ..board import Board
-from .options import HttpOptions
-from .settings import read
+from .settings import HttpOptions, read
 
 if TYPE_CHECKING:
     from ...clock import Instant

@@ -1,24 +1,21 @@
-"""Where the page is served, and to whom. The default is this computer only."""
+"""The options of the web page: where it is served, and to whom. The default is this computer only."""
 
 from __future__ import annotations
 
 import ipaddress
-import os
 import socket
-from stat import S_IRGRP, S_IROTH, S_IWGRP, S_IWOTH
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 from ...errors import UsageError
-from ...interface.options import short
-from ...values import NamedTuple
+from ...interface.options import Option, Options, short
+from ...user_files import read_secret
 from ..listener import listen as open_listener
 from ..listener import place, resolve
-from .options import DEFAULT_LISTEN, HttpOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-OF_OTHERS: Final = S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH
 SHORTEST_TOKEN: Final = 16  # characters
 LONGEST_TOKEN: Final = 1024
 SEND_BUFFER: Final = 1 << 16
@@ -30,6 +27,26 @@ SOCKET_OPTIONS: Final = (
     (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GONE),
 )
 BACKLOG: Final = 64
+
+
+DEFAULT_LISTEN: Final = "127.0.0.1:8765"
+
+
+@dataclass(frozen=True)
+class HttpOptions(Options):
+    """The options of the publisher `http`, and of `board`."""
+
+    listen: Annotated[str, Option("serve a live web page, for example on 127.0.0.1:8765", "--http", "HOST:PORT")] = (
+        DEFAULT_LISTEN
+    )
+    token_file: Annotated[
+        str | None, Option("show data only to clients that send the token in FILE", "--http-token-file", "FILE")
+    ] = None
+    open: Annotated[bool, Option("show data to everybody who can reach HOST:PORT", "--http-open")] = False
+    hosts: Annotated[tuple[str, ...], Option("further host names of the page: of a proxy or in DNS")] = ()
+    alarm: Annotated[
+        bool, Option("on the page, sound and mark each new error, stop and loss until it is acknowledged", "--alarm")
+    ] = False
 
 
 class WebSettings(NamedTuple):
@@ -78,16 +95,8 @@ def is_loopback(host: str, port: int) -> bool:
 
 def read_token(path: str) -> str:
     """The token in a file that only its owner can read. Raises UsageError, which never shows the token."""
-    name = os.path.expanduser(path)
-    try:
-        with open(name, "rb") as file:
-            if os.fstat(file.fileno()).st_mode & OF_OTHERS:
-                raise UsageError(f"{name}: other users can read or change this token: chmod 600 {name}")
-            data = file.read(LONGEST_TOKEN + 1).strip()
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise UsageError(f"{name}: cannot read the token: {reason}") from None
-    text = data.decode("ascii", "replace")
+    name, data = read_secret(path, "token", LONGEST_TOKEN + 1)
+    text = data.strip().decode("ascii", "replace")
     if not (SHORTEST_TOKEN <= len(text) <= LONGEST_TOKEN and all("!" <= c <= "~" for c in text)):
         raise UsageError(
             f"{name}: the token must be one line of at least {SHORTEST_TOKEN} characters without blanks: "

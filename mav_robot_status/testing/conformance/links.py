@@ -18,13 +18,12 @@ import math
 import select
 import threading
 from collections.abc import Callable, Iterator
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import pytest
 
 from ...links import Link, Received, open_link
 from ...links.url import parse
-from ...values import NamedTuple
 
 PATIENCE = 5.0
 """Seconds that a test waits for input. Only a test that fails waits so long."""

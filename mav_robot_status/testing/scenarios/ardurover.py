@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..firmwares import ARDUROVER
 from ..scenario import RC_RECEIVER, Action, Scenario, Step, by_satellite, step, with_applet
 
+Changes = dict[str, Any]
 _HEALTH = ARDUROVER.ready.sensors_health
 _STOPPED = (0.0, 0.0, 0.0)
+STANDS: Changes = {"velocity": _STOPPED, "throttle": 0}
+HOLDS: Changes = {"custom_mode": 4, "failsafe": True, **STANDS}
+"""A failsafe: CRITICAL in HOLD."""
+RADIO_LOST: Changes = {**HOLDS, "sensors_health": _HEALTH & ~RC_RECEIVER}
+RADIO_BACK: Changes = {"failsafe": False, "sensors_health": _HEALTH}
+RELEASED: Changes = {"emergency_stop": False, "velocity": (2.0, 0.0, 0.0), "throttle": 40}
 
 _ARM_AND_DRIVE = (
     step(3.0, "the driver arms", armed=True),
@@ -56,46 +65,22 @@ AUTO = _scenario(
     "a mission in AUTO",
     *_ARM_AND_DRIVE,
     _AUTO,
-    step(
-        12.0,
-        "the mission ends",
-        (6, "Reached waypoint #3"),
-        (5, "Mission Complete"),
-        velocity=_STOPPED,
-        throttle=0,
-    ),
+    step(12.0, "the mission ends", (6, "Reached waypoint #3"), (5, "Mission Complete"), **STANDS),
     step(15.0, "disarmed", armed=False),
 )
 RC_FAILSAFE = _scenario(
     "the radio is lost in AUTO and comes back",
     *_ARM_AND_DRIVE,
     _AUTO,
-    step(
-        9.0,
-        "the radio is lost: CRITICAL, HOLD",
-        (4, "Radio Failsafe"),
-        custom_mode=4,
-        failsafe=True,
-        sensors_health=_HEALTH & ~RC_RECEIVER,
-        velocity=_STOPPED,
-        throttle=0,
-    ),
-    step(15.0, "the radio is back", (6, "Radio Failsafe Cleared"), failsafe=False, sensors_health=_HEALTH),
+    step(9.0, "the radio is lost: CRITICAL, HOLD", (4, "Radio Failsafe"), **RADIO_LOST),
+    step(15.0, "the radio is back", (6, "Radio Failsafe Cleared"), **RADIO_BACK),
     step(18.0, "the driver takes over in MANUAL", custom_mode=0),
 )
 GCS_FAILSAFE = _scenario(
     "the ground station is lost in AUTO and comes back; the autopilot names the radio",
     *_ARM_AND_DRIVE,
     _AUTO,
-    step(
-        9.0,
-        "the ground station is lost: CRITICAL, HOLD; the radio is healthy",
-        (4, "Radio Failsafe"),
-        custom_mode=4,
-        failsafe=True,
-        velocity=_STOPPED,
-        throttle=0,
-    ),
+    step(9.0, "the ground station is lost: CRITICAL, HOLD; the radio is healthy", (4, "Radio Failsafe"), **HOLDS),
     step(15.0, "the ground station is back", (6, "GCS Failsafe Cleared"), failsafe=False),
     step(18.0, "the driver takes over in MANUAL", custom_mode=0),
 )
@@ -120,14 +105,7 @@ RC_ESTOP = _scenario(
     step(9.0, "emergency stop: only a text reports it", (6, "RC7: MotorEStop HIGH"), emergency_stop=True),
     step(10.0, "the rover has stopped, and AUTO increases the throttle", velocity=_STOPPED, throttle=58),
     step(12.0, "more throttle has no effect", throttle=81),
-    step(
-        14.0,
-        "released: the rover drives on",
-        (6, "RC7: MotorEStop LOW"),
-        emergency_stop=False,
-        velocity=(2.0, 0.0, 0.0),
-        throttle=40,
-    ),
+    step(14.0, "released: the rover drives on", (6, "RC7: MotorEStop LOW"), **RELEASED),
 )
 APPLET_ESTOP = with_applet(RC_ESTOP)
 CRASH = _scenario(

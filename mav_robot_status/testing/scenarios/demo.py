@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from ..firmwares import ARDUROVER
-from ..scenario import RC_RECEIVER, Action, Scenario, step
+from ..scenario import Action, Scenario, step
+from .ardurover import RADIO_BACK, RADIO_LOST, RELEASED, Changes
 
-_HEALTH = ARDUROVER.ready.sensors_health
 _STOPPED = (0.0, 0.0, 0.0)
+_MISSION: Changes = {"custom_mode": 10, "velocity": (2.0, 0.0, 0.0), "throttle": 40}
 
 DEMO = Scenario(
     "a rover from power-on to power-off",
@@ -19,39 +20,20 @@ DEMO = Scenario(
         ARDUROVER.boot[-1],
         step(8.5, "the driver arms: the drives are powered", armed=True),
         step(10.0, "the driver drives off in MANUAL", velocity=(1.0, 0.0, 0.0), throttle=31),
-        step(
-            12.5,
-            "AUTO: the mission drives",
-            (6, "Mission: 1 WP"),
-            custom_mode=10,
-            velocity=(2.0, 0.0, 0.0),
-            throttle=40,
-        ),
+        step(12.5, "AUTO: the mission drives", (6, "Mission: 1 WP"), **_MISSION),
         step(
             15.0,
             "the radio is lost: a failsafe, the rover stops in HOLD, in_error becomes true",
             (4, "Radio Failsafe"),
-            custom_mode=4,
-            failsafe=True,
-            sensors_health=_HEALTH & ~RC_RECEIVER,
-            velocity=_STOPPED,
-            throttle=0,
+            **RADIO_LOST,
         ),
         step(
             17.5,
             "the radio is back: the error clears, the rover still holds",
             (6, "Radio Failsafe Cleared"),
-            failsafe=False,
-            sensors_health=_HEALTH,
+            **RADIO_BACK,
         ),
-        step(
-            18.5,
-            "AUTO again: the mission continues",
-            (6, "Mission: 1 WP"),
-            custom_mode=10,
-            velocity=(2.0, 0.0, 0.0),
-            throttle=40,
-        ),
+        step(18.5, "AUTO again: the mission continues", (6, "Mission: 1 WP"), **_MISSION),
         step(
             20.5,
             "emergency stop by a switch of the remote control: armed, but the drives are off",
@@ -59,14 +41,7 @@ DEMO = Scenario(
             emergency_stop=True,
         ),
         step(21.0, "the rover has stopped", velocity=_STOPPED, throttle=58),
-        step(
-            22.5,
-            "emergency stop released: it drives on",
-            (6, "RC7: MotorEStop LOW"),
-            emergency_stop=False,
-            velocity=(2.0, 0.0, 0.0),
-            throttle=40,
-        ),
+        step(22.5, "emergency stop released: it drives on", (6, "RC7: MotorEStop LOW"), **RELEASED),
         step(24.0, "it runs into a wall", velocity=_STOPPED, throttle=80),
         step(
             24.5,

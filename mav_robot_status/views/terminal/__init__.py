@@ -49,7 +49,7 @@ def show(source: Source, footer: Callable[[], Sequence[str]] | None = None) -> i
         return 0
     with LogLines().instead_of_stderr() as log:
         if not footer and utf8 and find_spec("textual") is not None:
-            from .app import run
+            from .screen import run
 
             return run(source, log, signs)
         from .plain import redraw

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
-import termios
-import threading
 from collections.abc import Iterable, Mapping, Sequence
-from types import FrameType
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, VerticalScroll
 from textual.driver import Driver
-from textual.drivers.linux_driver import LinuxDriver
 from textual.events import Click
 from textual.widgets import DataTable, Footer, Input, Static
 
 from ...language import TONES
-from . import terminal_size
 from .columns import COLUMNS, Column, cell, columns, name_of, sort_key
 from .details import changes, details, evidence, help_lines
 from .log_lines import LogLines
@@ -35,9 +27,6 @@ AGES: Final = 0.5
 MOST_CHANGES: Final = 100
 LOW: Final = 18
 """Below this height there is no room for the details under the table."""
-PATIENCE: Final = 3.0
-"""Seconds for the terminal to take the last output."""
-ENDS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def painted(lines: Iterable[Line]) -> Text:
@@ -349,35 +338,3 @@ class WatchApp(App[None]):
     def action_redraw(self) -> None:
         """Draw the whole screen again."""
         self.refresh(repaint=True, layout=True)
-
-
-class Output(LinuxDriver):
-    """Draws on standard output: standard error may be a file with the log."""
-
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        self._file = sys.__stdout__
-
-    def _get_terminal_size(self) -> tuple[int, int]:
-        return terminal_size()
-
-
-def run(source: Source, log: LogLines, signs: Signs) -> int:
-    """Show the source. Returns the exit code."""
-    app, before = WatchApp(source, log, signs, Output), termios.tcgetattr(0)
-
-    def give_up() -> None:
-        termios.tcsetattr(0, termios.TCSANOW, before)
-        os._exit(0)
-
-    def end(number: int, frame: FrameType | None) -> None:
-        """Not a handler of asyncio: the loop may be waiting for a terminal that takes no output any more."""
-        timer = threading.Timer(PATIENCE, give_up)
-        timer.daemon = True
-        timer.start()
-        app.call_later(app.exit)
-
-    for number in ENDS:
-        signal.signal(number, end)
-    app.run()
-    return app.return_code or 0

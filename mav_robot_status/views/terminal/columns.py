@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from ...interface import STATES
 from ...language import LINK, ROBOT_STATES, look
-from ...values import NamedTuple
 from .robots import Order, Robot, by_name, by_urgency
 from .text import Line, Signs, Span, cells, clock, duration, fill, padded, toned
 

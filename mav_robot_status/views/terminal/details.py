@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from ...interface import STATES
+from ...json_object import JsonMapping
 from ...language import LINK, LOOKS, ROBOT_STATES, TONES, look
 from .columns import state
+from .robots import Change, Robot
 from .text import Line, Signs, Span, clock, duration, fill, padded, toned
-
-if TYPE_CHECKING:
-    from ...json_object import JsonMapping
-    from .robots import Change, Robot
 
 LABEL: Final = 10
 """Width of the labels, in cells."""

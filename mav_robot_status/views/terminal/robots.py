@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
-from ...clock import rfc3339
+from ...clock import Instant, rfc3339
 from ...interface import DEFAULT_HANDLE_NAME
-from ...language import headline, look
+from ...json_object import JsonMapping
+from ...language import Headline, Look, headline, look
 from ...language.states import ARMED
-from ...values import NamedTuple
-
-if TYPE_CHECKING:
-    from ...clock import Instant
-    from ...json_object import JsonMapping
-    from ...language import Headline, Look
 
 
 class Row(Protocol):

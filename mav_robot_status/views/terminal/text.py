@@ -5,14 +5,10 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterable, Iterator
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
-from ...language import TONES
+from ...language import TONES, Look, State, Tone
 from ...streams import visible
-from ...values import NamedTuple
-
-if TYPE_CHECKING:
-    from ...language import Look, State, Tone
 
 
 class Span(NamedTuple):

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bench import workload
-from mav_robot_status.gateway.routing import MOST_FRAMES
+from mav_robot_status.gateway.links.routing import MOST_FRAMES
 from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.mavlink.framing import Parser
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from mav_robot_status.commands.options import WITH_ARGUMENTS, given, may_name, options_of
+from mav_robot_status.commands.options import given
 from mav_robot_status.commands.overrides import configured, loaded, only, overridden, with_publisher
 from mav_robot_status.config import Config, ControllerConfig, LinkConfig, PublisherConfig, SigningConfig, VehicleConfig
 from mav_robot_status.errors import UsageError
-from mav_robot_status.publishers.mqtt.options import BrokerOptions
-from mav_robot_status.publishers.web.options import HttpOptions
+from mav_robot_status.publishers.mqtt.settings import BrokerOptions
+from mav_robot_status.publishers.web.settings import HttpOptions
 
 from .said import said
 
@@ -201,17 +201,3 @@ def test_a_name_of_the_command_line_replaces_that_of_the_file(tmp_path: Path) ->
 def test_one_vehicle_has_one_name() -> None:
     with pytest.raises(UsageError, match=r"--name 1\.2= is given twice: one vehicle has one name"):
         loaded(run("--name", "1.2=a", "--name", "1.2=b"))
-
-
-def test_a_publisher_is_declared_if_an_argument_may_name_one_of_its_flags() -> None:
-    for words in (["--mqtt", "u"], ["--mqtt-user=x"], ["--mq", "u"], ["--m", "1"], ["-h"], ["--he"], ["-qh"], ["--"]):
-        assert may_name("--mqtt", words), words
-    for words in ([], ["mqtt:h"], ["--max-gap", "1"], ["-q"], ["--http", ":1"], ["--record=h"]):
-        assert not may_name("--mqtt", words), words
-
-
-def test_every_flag_of_a_publisher_begins_as_the_table_says() -> None:
-    for kind, (beginnings, _, _) in WITH_ARGUMENTS.items():
-        flags = [one.option.flag for one in options_of(kind).declared() if one.option.flag]
-        assert flags[0] == beginnings[0]
-        assert all(flag.startswith(beginnings) for flag in flags)

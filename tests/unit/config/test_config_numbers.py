@@ -19,8 +19,8 @@ from mav_robot_status.gateway.plugins import OURS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions, Within
 from mav_robot_status.interface.options import Options
 from mav_robot_status.publishers.json_lines import JsonOptions
-from mav_robot_status.publishers.mqtt.options import MqttOptions
-from mav_robot_status.publishers.web.options import HttpOptions
+from mav_robot_status.publishers.mqtt.settings import MqttOptions
+from mav_robot_status.publishers.web.settings import HttpOptions
 
 STANZA = "c: {{type: mav_robot_status/IndustrialRobotStatusController, {}}}\n"
 SECTIONS: list[tuple[type, str]] = [

@@ -292,7 +292,7 @@ def test_a_stop_that_was_said_once_stays_while_the_vehicle_coasts() -> None:
 
 
 @pytest.mark.parametrize("source", [AWAY, HOME], ids=["two addresses", "one address"])
-@pytest.mark.parametrize(("dies", "lag"), [(99.0, 5.0), (99.0, 0.6), (12.5, 7.0)])
+@pytest.mark.parametrize(("dies", "lag"), [(99.0, 5.0), (99.0, 0.6), (12.5, 7.0), (12.5, 5.3)])
 def test_a_signed_link_that_is_late_is_not_taken_for_the_latest(
     signing: SigningConfig, source: Source, dies: float, lag: float
 ) -> None:

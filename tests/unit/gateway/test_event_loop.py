@@ -159,7 +159,7 @@ def test_frames_from_two_addresses_are_handled_in_arrival_order(stdout: TextIO, 
     with closing(live), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
         for sequence, sender in enumerate((vehicle, vehicle, second, vehicle, second, second)):
             sender.sendto(autopilot(1 + (sender is second), sequence), address(live))
-        heard = live.hardware.mavlink.hub.receive(live.endpoints[0], Instant(1.0, 0))
+        heard, _ = live.hardware.mavlink.hub.receiver.receive(live.endpoints[0], Instant(1.0, 0))
     assert [(frame.sequence, frame.ids[0]) for frame, _ in heard] == [(0, 1), (1, 1), (2, 2), (3, 1), (4, 2), (5, 2)]
     assert len({channel for _, channel in heard}) == 2
 

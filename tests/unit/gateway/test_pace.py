@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from mav_robot_status.gateway.pace import BURST, MOST_ALONE, MOST_AT_ONCE, PACE, RATE, UNCOUNTED, Pace
+from mav_robot_status.gateway.pace import BURST, PACE, RATE, UNCOUNTED, Pace
 
 
 def rests(pace: Pace, every: float, pieces: int, times: int = 200) -> list[float]:
@@ -43,25 +43,7 @@ def test_a_source_that_does_not_count_is_delayed_above_500_a_second() -> None:
     assert rests(Pace(), 1 / 1000, UNCOUNTED)[-1] > 0.0
 
 
-def test_a_piece_that_arrives_alone_is_read_with_one_call_and_no_queue_can_build_up_behind_it() -> None:
-    pace = Pace()
-    limits = [pace.limit(now, now + 0.001) for now in range(MOST_ALONE + 2)]
-    assert limits == [1] * MOST_ALONE + [MOST_AT_ONCE, 1]
-
-
-def test_input_that_did_not_have_to_be_waited_for_is_read_as_a_batch() -> None:
-    assert Pace().limit(1.0, 1.0001) == MOST_AT_ONCE
-
-
-def test_what_has_gathered_during_a_rest_is_read_as_a_batch() -> None:
-    pace = Pace()
-    pace.count(100, 1.0)
-    assert pace.limit(1.0, 1.0 + PACE) == MOST_AT_ONCE
-    assert pace.limit(1.0 + PACE, 1.0 + 2 * PACE) == 1
-
-
-def test_gathered_input_is_read_as_a_batch_at_most_once_in_the_time() -> None:
+def test_gathered_input_is_read_at_most_once_in_the_time() -> None:
     pace = Pace(gather=0.01)
     pace.count(1, 2.0)
     assert pace.rests_until == 2.01
-    assert pace.limit(2.0, 2.02) == MOST_AT_ONCE

@@ -9,7 +9,7 @@ import pytest
 
 from mav_robot_status.config import Config, LinkConfig, VehicleConfig
 from mav_robot_status.errors import UsageError
-from mav_robot_status.gateway.recorded_log import Recording
+from mav_robot_status.gateway.logs.recorded_log import Recording
 from mav_robot_status.gateway.replay import ReplayPipeline, replay, run_through
 from mav_robot_status.hardware.mavlink import update
 from mav_robot_status.hardware.mavlink.derive import derive

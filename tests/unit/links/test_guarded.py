@@ -9,7 +9,7 @@ import pytest
 from mav_robot_status.clock import Instant
 from mav_robot_status.config import Config, LinkConfig
 from mav_robot_status.errors import LinkError
-from mav_robot_status.gateway.link_hub import LinkHub
+from mav_robot_status.gateway.links.link_hub import LinkHub
 from mav_robot_status.links import Address, LinkKind, Received, Url, kinds
 from mav_robot_status.links.guarded import RETRY, STABLE_AFTER, GuardedLink, open_guarded
 from mav_robot_status.links.url import parse
@@ -228,7 +228,7 @@ def test_a_link_that_raises_does_not_end_the_gateway(
     hub = LinkHub(Config(links=(LinkConfig("faulty:x"), LinkConfig("udpout:127.0.0.1:9"))), lambda: now)
     Faulty.fails = method
     for endpoint in hub.endpoints:
-        hub.receive(endpoint, now)
+        hub.receiver.receive(endpoint, now)
     hub.speak((), now.mono)
     hub.close()
     assert opened[0].closed == 1

@@ -26,7 +26,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mav_robot_status.errors import LinkError, UsageError
-from mav_robot_status.gateway.recorded_log import Recording
+from mav_robot_status.gateway.logs.recorded_log import Recording
 from mav_robot_status.links import record, tlog_file
 from mav_robot_status.links.record import MAX_WAITING, TlogWriter
 from mav_robot_status.links.tlog_file import MAX_RECORD, TAIL

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from mav_robot_status.mavlink.definitions import Heartbeat
+from mav_robot_status.mavlink.definitions import CommandLong, Heartbeat
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.testing import ManualClock, arducopter, ardurover, decode, px4
-from mav_robot_status.testing.definitions import CommandLong
 from mav_robot_status.testing.fake_fleet import FakeFleet
 from mav_robot_status.testing.scenario import Action, ending
 

@@ -93,10 +93,10 @@ def test_only_an_autopilot_with_prearm_checks_reports_them(firmware: Firmware, m
 
 
 def test_available_modes_are_listed_all_or_one_by_one() -> None:
-    everything = [m._asdict() for m in available_modes(rows.BETAFLIGHT, 0)]
-    assert [m["mode_name"] for m in everything][:3] == [b"Acro", b"Angle", b"Horizon"]
+    everything = [m.to_dict() for m in available_modes(rows.BETAFLIGHT, 0)]
+    assert [m["mode_name"] for m in everything][:3] == ["Acro", "Angle", "Horizon"]
     assert {m["number_modes"] for m in everything} == {len(everything)} == {8}
-    assert [m._asdict() for m in available_modes(rows.BETAFLIGHT, 4)] == [everything[3]]
+    assert [m.to_dict() for m in available_modes(rows.BETAFLIGHT, 4)] == [everything[3]]
     assert everything[3]["mode_index"] == 4
     assert available_modes(rows.BETAFLIGHT, 9) == available_modes(rows.ARDUSUB, 0) == []
 

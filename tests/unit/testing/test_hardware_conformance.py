@@ -10,7 +10,7 @@ import pytest
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.config import Config, LinkConfig, VehicleConfig
-from mav_robot_status.gateway.guarded_hardware import GuardedHardware
+from mav_robot_status.gateway.guards.hardware import GuardedHardware
 from mav_robot_status.gateway.mavlink_hardware import MavlinkHardware, robot_hw
 from mav_robot_status.hardware.combined import CombinedRobotHW
 from mav_robot_status.interface import HardwareContext, HardwareInterface, RobotHW, RobotMode, RobotStatus, TriState

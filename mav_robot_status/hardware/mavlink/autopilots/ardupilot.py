@@ -268,7 +268,12 @@ ARDUPILOT: Final = Autopilot(
         overrides_key=None,
         initialising=dict.fromkeys((Family.PLANE, Family.ROVER, Family.TRACKER), INITIALIZING),
     ),
-    states=States(uninit=Uninit.STARTING, standby_is_landed=True, hides_armed=frozenset()),
+    states=States(
+        uninit=Uninit.STARTING,
+        standby_is_landed=True,
+        hides_armed=frozenset(),
+        emergency_is_crash=frozenset({Family.PLANE}),  # GCS_MAVLINK_Plane::vehicle_system_status
+    ),
     texts=Texts(
         rules=TEXTS,
         stop_text=StopText.READINESS,

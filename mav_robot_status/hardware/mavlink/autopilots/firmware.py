@@ -7,9 +7,7 @@ FIRMWARE_VERSION_TYPE; ArduPilot's `GCS_MAVLINK::send_banner`, the text `ArduCop
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
-
-from ....values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -31,7 +31,9 @@ GENERIC: Final = Autopilot(
     name="other",
     recognition=Recognition(autopilots=frozenset(), lacks=None),
     modes=Modes(flight_mode=standard, overrides_key=None, initialising={}),
-    states=States(uninit=Uninit.STARTING, standby_is_landed=False, hides_armed=frozenset()),
+    states=States(
+        uninit=Uninit.STARTING, standby_is_landed=False, hides_armed=frozenset(), emergency_is_crash=frozenset()
+    ),
     texts=Texts(
         rules=(),
         stop_text=StopText.STATE,

@@ -6,11 +6,10 @@ MAV_STANDARD_MODE and MAV_MODE_FLAG of common.xml. Each determines who decides t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....interface.status import RobotMode
 from ....mavlink import enumerations as mavlink
-from ....values import NamedTuple
 
 if TYPE_CHECKING:
     from ....mavlink.definitions import Heartbeat

@@ -65,7 +65,9 @@ PAPARAZZI: Final[Autopilot] = GENERIC._replace(
     name="Paparazzi",
     recognition=Recognition(autopilots=frozenset({mavlink.MAV_AUTOPILOT_PPZ}), lacks=None),
     modes=Modes(flight_mode=flight_mode, overrides_key=None, initialising={}),
-    states=GENERIC.states._replace(hides_armed=frozenset({mavlink.MAV_STATE_CALIBRATING})),
+    states=GENERIC.states._replace(
+        hides_armed=frozenset({mavlink.MAV_STATE_CALIBRATING}), emergency_is_crash=frozenset()
+    ),
     sensors=GENERIC.sensors._replace(weights={}, are_monitored=False),
     speeds=Speeds(
         zero=ZeroSpeed.GPS_HEALTHY,

@@ -5,9 +5,7 @@ fails at import.
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING
-
-from ....values import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import re
@@ -91,6 +89,8 @@ class States(NamedTuple):
     """Whether STANDBY, while armed, means that the land detector reports landed."""
     hides_armed: frozenset[int]
     """The MAV_STATEs in which a heartbeat lacks the armed bit although the drives may be powered."""
+    emergency_is_crash: frozenset[Family]
+    """The families that set EMERGENCY after a crash, and only then."""
 
 
 class Texts(NamedTuple):

@@ -149,7 +149,9 @@ PX4: Final = Autopilot(
     name="PX4",
     recognition=Recognition(autopilots=frozenset({mavlink.MAV_AUTOPILOT_PX4}), lacks=None),
     modes=Modes(flight_mode=flight_mode, overrides_key="px4", initialising={}),
-    states=States(uninit=Uninit.NOT_READY, standby_is_landed=False, hides_armed=frozenset()),
+    states=States(
+        uninit=Uninit.NOT_READY, standby_is_landed=False, hides_armed=frozenset(), emergency_is_crash=frozenset()
+    ),
     texts=Texts(
         rules=TEXTS,
         stop_text=StopText.STATE,

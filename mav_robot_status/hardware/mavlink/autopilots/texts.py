@@ -9,10 +9,9 @@ from __future__ import annotations
 import re
 from enum import Enum
 from functools import cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....mavlink.enumerations import MAV_SEVERITY_CRITICAL
-from ....values import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

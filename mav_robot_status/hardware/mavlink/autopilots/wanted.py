@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 from ....mavlink import definitions as mav
 from ....mavlink import enumerations as mavlink
-from ....values import NamedTuple
 
 
 class Wanted(NamedTuple):

@@ -61,7 +61,7 @@ SILENT: Final = 1.5
 More than the interval of HEARTBEATs: some senders send nothing else."""
 MOST_SPEAKERS: Final = 12
 MOST_NEW: Final = 2
-"""New speakers on one channel. A further count is a gap in the first of them."""
+"""New speakers on one channel that do not say armed. A further one takes the place of the first of them."""
 FORGOTTEN: Final = 25.0
 """Seconds of silence after which a speaker is forgotten, unless it is the main one."""
 
@@ -143,7 +143,7 @@ class Belief:
             return COPY
         clock = message.time_boot_ms / 1000 if message_id in CLOCKED and message is not None else None
         signed = lag if lag > NOT_LATE else 0.0
-        count, place = self._count_of(message_id, sequence, clock, counts, now)
+        count, place = self._count_of(message_id, sequence, clock, counts, now, signed)
         if count is None:
             beat = message if message_id == HEARTBEAT_ID else None
             count, place = self._begin(channel, sequence, clock, beat, counts, at), 1
@@ -157,7 +157,7 @@ class Belief:
         if message is None:
             return Heard(Verdict.LATE if place < 0 else Verdict.NEWS, speaker)
         if message_id not in SAID_ONCE and not _is_newest(speaker, message_id, said, 0.0 if place < 0 else JITTER):
-            claims = message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and speaker.claim_late(message, at)
+            claims = message_id == HEARTBEAT_ID and speaker.claim_late(message, at)
             return Heard(Verdict.LATE, speaker if claims else None)
         speaker.said_at = max(speaker.said_at, said)
         when = now if said == at else now._replace(mono=said, unix_us=now.unix_us - round((at - said) * 1e6))
@@ -181,7 +181,8 @@ class Belief:
         known.heard_on(channel, now)
         if original.heard_in.channel is channel or any(count.speaker is known for count in counts):
             return
-        nearest = min(counts, key=lambda count: count.distance(sequence), default=None)
+        spoke = (count for count in counts if now - count.at <= LATE_FOR)
+        nearest = min(spoke, key=lambda count: count.distance(sequence), default=None)
         if nearest is not None and nearest.distance(sequence) <= MAX_MISORDER and known in self.speakers:
             other: Speaker = nearest.speaker
             other.copies[known] = other.copies.get(known, 0) + 1
@@ -189,7 +190,7 @@ class Belief:
                 self._join(other, known, now, "the same frames")
 
     def _count_of(
-        self, message_id: int, sequence: int, clock: float | None, counts: Sequence[Count], now: Instant
+        self, message_id: int, sequence: int, clock: float | None, counts: Sequence[Count], now: Instant, signed: float
     ) -> tuple[Count | None, int]:
         """The count that a frame continues best, and its place there: 0 if it is counted apart."""
         if message_id == COUNTED_APART and counts:
@@ -203,6 +204,8 @@ class Belief:
                 continue
             if count is not ordered[0] and now.mono - count.at > LATE_FOR:
                 break  # another count took its place
+            if signed and found > 0 and now.mono - signed < count.last_said - NEAR:
+                continue  # by its signature it is older than the newest frame of that count
             if clock is not None and _contradicts(count, found, clock, now.mono):
                 refused = count if refused is None and found > 0 else refused
                 continue
@@ -230,17 +233,16 @@ class Belief:
     ) -> Count:
         """A count for a frame that continues none: of the speaker whose frames the channel repeats, or of a new one."""
         echo = self._copies.echoes.get(channel)
-        new = [count for count in counts if not count.speaker.proven]
+        new = [count.speaker for count in counts if not count.speaker.proven and not count.speaker.armed]
         if not counts and echo is not None and echo.repeats(sequence, now):
             count = Count(echo.heard_in.speaker, channel, sequence, now, echo.heard_in)
         elif counts and _is_sparse(counts, clock, beat, now):
             count = Count(counts[0].speaker, channel, sequence, now)
             count.lag = counts[0].lag
             self._break(count.speaker, list(counts), now)
-        elif len(new) >= MOST_NEW:
-            self._drop_count(new[0])
-            count = Count(new[0].speaker, channel, sequence, now)
         else:
+            if len(new) >= MOST_NEW:
+                self._drop(new[0])
             count = Count(self._new_speaker(channel, now), channel, sequence, now)
         count.speaker.counts.append(count)
         if count.speaker not in self.speakers:
@@ -267,6 +269,9 @@ class Belief:
             self._prove(speaker, at)
             count.ticked_at = at - count.lag.seconds
             return count.lag.seconds
+        echo = self._copies.echoes.get(count.channel) if count.source is not None else None
+        if echo is not None and at - echo.at <= NEAR and echo.delay > NOT_LATE:
+            return echo.delay  # what it brings is as late as its copies
         held = count.held_for(place, at) if place > 0 and speaker.clock.booted is not None else 0.0
         if held:
             count.lag.hold(held + (count.lag.seconds if count.lag.at <= count.at else 0.0), at)
@@ -338,6 +343,7 @@ class Belief:
         self.speakers.remove(young)
         if young is self.main:
             self.main = old
+        old.kept.extend(young.kept)  # it may itself be proven to be another one
         self.changes.append(Joined(old, tuple(young.kept), booted))
 
     def _break(self, speaker: Speaker, counts: Iterable[Count], now: float) -> None:
@@ -498,8 +504,8 @@ def _is_sparse(counts: Sequence[Count], clock: float | None, beat: Heartbeat | N
     """Whether a frame that continues no count is one more gap in that of the only speaker of the channel."""
     speaker: Speaker = counts[0].speaker
     alone = all(count.speaker is speaker for count in counts)
-    if beat is not None and speaker.armed and not may_move(beat):
-        return False  # what is dangerous to believe needs a proof
+    if beat is not None and speaker.armed is not may_move(beat):
+        return False  # a second vehicle would say so, too
     return alone and speaker.is_sparse(now) and (clock is None or speaker.clock.fits(clock, now))
 
 

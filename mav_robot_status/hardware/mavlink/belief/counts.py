@@ -20,6 +20,8 @@ SETTLES: Final = 1.0
 """Seconds after which a missing number is lost."""
 LOOK: Final = 0.2
 """Seconds between two looks at the missing numbers."""
+STANDS_STILL: Final = 10.0
+"""Seconds within which a sender whose number never changes is heard again."""
 SAME: Final = 256
 """The place of a frame of a sender whose number never changes."""
 JUST_BEFORE: Final = 1e-4  # s
@@ -54,7 +56,7 @@ class Count:
         if 0 < ahead <= MAX_DROPOUT + 1:
             return ahead
         if ahead == 0:
-            return None if self.changes else SAME
+            return None if self.changes or now - self.at > STANDS_STILL else SAME
         behind = 256 - ahead
         if behind > MAX_MISORDER or now - self.at > LATE_FOR:
             return None
@@ -86,7 +88,8 @@ class Count:
             for number in range(self.index + 1, self.index + ahead):
                 if number not in self._used:
                     self._missing[number] = now, self.at
-            self._used.clear()
+            if self._used:
+                self._used = {number for number in self._used if number > self.index + ahead}
             self.changes = self.changes or self.index >= self._first
         self.index += ahead
         self.at = now
@@ -127,5 +130,8 @@ class Count:
 
     def said_behind(self, behind: int, latest: float) -> float:
         """When a late frame was said: just before the next number, at `latest`."""
-        self._missing.pop(self.index - behind, None)
-        return min(latest, self.said_after(behind) - JUST_BEFORE)
+        number = self.index - behind
+        self._missing.pop(number, None)
+        said = min(latest, self.said_after(behind) - JUST_BEFORE)
+        self._said = deque(sorted((*self._said, (number, said))), maxlen=self._said.maxlen)
+        return said

@@ -139,13 +139,11 @@ class Speaker:
         self.compare(heartbeat, now)
 
     def claim_late(self, heartbeat: Heartbeat, now: float) -> bool:
-        """Note a HEARTBEAT that seems to be older than the newest one: armed counts unless disarmed is newer."""
-        is_vehicle = heartbeat.autopilot != MAV_AUTOPILOT_INVALID
-        nothing_newer = self.armed or now > self.stands_until
-        counts = bool(self.beats) and nothing_newer and is_vehicle and may_move(heartbeat)
-        if counts:
-            self.armed, self.beat_at = True, now
-        return counts
+        """Note a HEARTBEAT that is older than the newest one. Whether it says armed: then disarmed is in doubt."""
+        if not self.beats or heartbeat.autopilot == MAV_AUTOPILOT_INVALID or not may_move(heartbeat):
+            return False
+        self.armed, self.beat_at = True, now
+        return True
 
     def compare(self, heartbeat: Heartbeat, now: Instant) -> None:
         """Compare a HEARTBEAT, or what is said beside the HEARTBEATs, with those before: two vehicles alternate."""

@@ -14,6 +14,7 @@ from ....mavlink.enumerations import (
 )
 from .. import causes
 from ..autopilots.profile import EmergencyStop, Uninit
+from ..identity import Family
 from ..state import arming_report, estop, event_sequence, latches, outputs, readiness, sensors
 from ..state.heartbeat_history import armed_before, next_heartbeat
 from ..state.high_latency import is_statement
@@ -33,6 +34,8 @@ LONG_LOSS: Final = 30.0
 """Seconds of link loss after which all latched state is invalid."""
 LONGEST_START: Final = 10.0
 """Seconds from the first heartbeat to the text that ends the start."""
+FLIES: Final = frozenset({Family.COPTER, Family.PLANE})
+"""An autopilot does not disarm these in motion, but for a crash, a termination or a forced disarm."""
 TICKS: Final = 1.5
 """Seconds within which a clock counts as running."""
 
@@ -76,6 +79,11 @@ def heartbeat(state: VehicleState, message: Heartbeat, now: Instant, options: Ha
         state.arming = arming_report.NOTHING  # a newer one may be lost
     if before.armed and not heartbeats.armed and now.mono - last < SUDDEN:
         state.told_armed = now.mono + 1e-6
+    if before.armed and not heartbeats.armed and state.motion.value is TriState.TRUE and state.family in FLIES:
+        state.disarmed_at = now.mono
+        state.note_loss(state.lost_at)
+    elif heartbeats.armed:
+        state.disarmed_at, state.unexplained = None, False
     if heartbeats.armed and not (before.armed and connected):
         state.armed_after = seen.sys_status.message if seen.sys_status is not None else None
     if not connected or (before.armed and not heartbeats.armed):

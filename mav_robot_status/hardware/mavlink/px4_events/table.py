@@ -6,10 +6,10 @@ Everything here is a frozen value, made of checked parts: decoding an event neve
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from struct import Struct
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ....values import NamedTuple, dataclass
 from .ids import CHECK, SUMMARY, component_name
 from .template import Template, filled
 

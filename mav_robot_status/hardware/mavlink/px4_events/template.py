@@ -6,9 +6,7 @@ Source: mavlink/libevents, README ("Message and description") and `ParsedEvent::
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
-
-from mav_robot_status.values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

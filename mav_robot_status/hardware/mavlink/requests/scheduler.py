@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ....interface import LinkState
 from ....mavlink import definitions as mav
@@ -11,7 +11,6 @@ from ....mavlink import enumerations as mavlink
 from ....mavlink.decode import text
 from ....mavlink.definitions import CommandAck, MessageInterval, ParamValue, Statustext
 from ....mavlink.enumerations import MAV_STATE_BOOT, MAV_STATE_CALIBRATING, MAV_STATE_UNINIT
-from ....values import NamedTuple
 from ..autopilots.profile import Uninit
 from ..autopilots.wanted import METADATA, OUTPUT_WATCH, Once
 from . import prearm_checks

@@ -104,6 +104,8 @@ def _released(facts: Facts, options: HardwareOptions, watched: TriState, why: Re
         if facts.stop_excused:
             excused = "the pre-arm checks pass, but do not fail on a stop by the switch of option 165"
             return UNKNOWN, Reason(excused, Source.SWITCHES)
+        if facts.stop.unexplained:  # a termination disarms, and no check fails on it
+            return UNKNOWN, Reason("it was disarmed in motion, and frames that may tell why are lost", Source.STOP)
         return FALSE, Reason("the pre-arm checks, which include the stop, pass", Source.PREARM_CHECK)
     if facts.stop.said is FALSE:
         return FALSE, SAID
@@ -111,6 +113,9 @@ def _released(facts: Facts, options: HardwareOptions, watched: TriState, why: Re
         return FALSE, why
     if _is_assumed_free(facts, options):
         return FALSE, ASSUMED
+    if facts.outputs.fresh and facts.outputs.idle:
+        rule = "the outputs stand at their stop value while throttle is demanded, and may be motors"
+        return UNKNOWN, Reason(rule, Source.OUTPUTS, doubt=True)
     return UNKNOWN, Reason("ArduPilot does not show an emergency stop in HEARTBEAT, SYS_STATUS or texts alone")
 
 

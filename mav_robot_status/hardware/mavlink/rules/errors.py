@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....interface.status import ErrorCause
 from ....mavlink.enumerations import MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
-from ....values import NamedTuple
 from .. import causes
 from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, Source
 from .simulation import is_simulated
@@ -74,7 +73,8 @@ def _of_state(facts: Facts, found: Collection[int]) -> Iterator[Error]:
     if state == MAV_STATE_FLIGHT_TERMINATION and not is_simulated(facts):
         yield _error(causes.FLIGHT_TERMINATION, words, since, Source.STATE)
     if state == MAV_STATE_EMERGENCY and not causes.NAMED_EMERGENCIES.intersection(found):
-        yield _error(causes.EMERGENCY, words, since, Source.STATE)
+        crashed = facts.kind.family in facts.kind.profile.states.emergency_is_crash
+        yield _error(causes.CRASH if crashed else causes.EMERGENCY, words, since, Source.STATE)
     if state == MAV_STATE_CRITICAL and not causes.NAMED_FAILSAFES.intersection(found):
         if facts.sys_status.rc_lost_with_state:
             yield _error(causes.RC_LOST, words, since, Source.STATE_AND_RC)
@@ -94,4 +94,6 @@ def in_error(facts: Facts, errors: list[Error]) -> Finding:
         return UNKNOWN, Reason("no fresh SYS_STATUS")
     if not facts.kind.profile.sensors.are_monitored:
         return UNKNOWN, CONSTANT
+    if facts.stop.unexplained and not facts.armed:  # a crash or a termination disarms, and a text alone says so
+        return UNKNOWN, Reason("it was disarmed in motion, and frames that may tell why are lost", Source.STOP)
     return FALSE, Reason("no cause is active", Source.SYS_STATUS)

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 new: Final = tuple.__new__  # as in `framing`
 
-NO_OUTPUTS: Final = Outputs(False, False, False, False)
-NOTHING_SAID: Final = Stop(UNKNOWN, None, False, None)
+NO_OUTPUTS: Final = Outputs(False, False, False, False, False)
+NOTHING_SAID: Final = Stop(UNKNOWN, None, False, None, False)
 NO_APPLET: Final = Applet(UNKNOWN, False, False)
 
 
@@ -38,9 +38,10 @@ def motor_outputs(state: VehicleState, moment: Moment, options: HardwareOptions)
     watch = state.watch
     if watch.at is None or not state.heartbeats.armed:
         return NO_OUTPUTS
-    held = watch.held and outputs.proves_stop(state.family, state.vehicle_type, vtol_state(state))
+    proves = outputs.proves_stop(state.family, state.vehicle_type, vtol_state(state))
     at_stop = state.latest.esc is not None and outputs.is_at_stop(watch, state.vehicle_type)
-    return new(Outputs, (moment.is_within(watch.at + FRESH), watch.driven, held, at_stop))
+    fresh = moment.is_within(watch.at + FRESH)
+    return Outputs(fresh, watch.driven, watch.held and proves, at_stop, watch.idle and proves)
 
 
 def outputs_vetoed(state: VehicleState, moment: Moment, options: HardwareOptions) -> bool:
@@ -63,14 +64,14 @@ def stop(state: VehicleState, moment: Moment, options: HardwareOptions) -> Stop:
     said, word, doubt = state.stop, state.applet, state.stop.doubt
     if word is not None and applets.stops(word, honours_stop(state)) and not moment.is_within(word.at + applets.FRESH):
         doubt = doubt or estop.APPLET_SILENT
-    elif said is estop.NOTHING:
+    elif said is estop.NOTHING and not state.unexplained:
         return NOTHING_SAID
     is_over = said.repeats and moment.has_come(said.last + estop.REPEATED)
     if said.lost_at is not None and moment.has_come(said.lost_at + estop.OUTLASTS_LOSS):
         is_over = True
         doubt = doubt or (estop.FRAMES_LOST if said.said is TRUE else None)
     value = UNKNOWN if is_over else said.said
-    return new(Stop, (value, said.text, said.ready >= estop.READY_MESSAGES, doubt))
+    return Stop(value, said.text, said.ready >= estop.READY_MESSAGES, doubt, state.unexplained)
 
 
 def applet(state: VehicleState, moment: Moment, options: HardwareOptions) -> Applet:

@@ -7,9 +7,7 @@ outputs.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
-
-from ....values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from ....mavlink.definitions import NamedValueFloat

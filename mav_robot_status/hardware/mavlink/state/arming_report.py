@@ -8,9 +8,8 @@ newer report. Chunks combine as in libevents (`health_and_arming_checks.cpp`): A
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ....values import NamedTuple
 from ..px4_events import ARMING_SUMMARY, HEALTH_SUMMARY
 from ..px4_events.ids import ALL_MODES, PROTOCOL, component_name
 from ..px4_events.table import check_numbers, summary_numbers

@@ -19,10 +19,9 @@ texts.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....interface.status import TriState
-from ....values import NamedTuple
 from .sensors import readiness, safety_switch_on
 
 if TYPE_CHECKING:

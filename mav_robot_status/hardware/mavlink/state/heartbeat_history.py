@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from math import inf
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED, MAV_STATE_CRITICAL
-from ....values import NamedTuple
 
 if TYPE_CHECKING:
     from ....clock import Instant
@@ -21,6 +21,8 @@ class Run(NamedTuple):
     armed: bool
     first: float
     last: float
+    missed_at: float = inf
+    """When other frames went on although the last one was older than the time-out. inf: they did not."""
 
 
 class HeartbeatHistory(NamedTuple):
@@ -56,7 +58,7 @@ def next_heartbeat(
     state = heartbeat.system_status
     last = heartbeats.runs[-1]
     if armed == last.armed:
-        runs = (*heartbeats.runs[:-1], new(Run, (armed, last.first, now.mono)))
+        runs = (*heartbeats.runs[:-1], Run(armed, last.first, now.mono))
     else:
         runs = (*heartbeats.runs[-RUNS + 1 :], Run(armed, now.mono, now.mono))
     calm = heartbeats.calm_since if heartbeats.calm_since is not None else now.mono
@@ -71,10 +73,18 @@ def next_heartbeat(
     )
 
 
+def missed(heartbeats: HeartbeatHistory, now: float) -> HeartbeatHistory:
+    """The history after a frame that shows that heartbeats were lost: since then it may have been disarmed."""
+    last = heartbeats.runs[-1]
+    if last.missed_at <= now:
+        return heartbeats
+    return heartbeats._replace(runs=(*heartbeats.runs[:-1], last._replace(missed_at=now)))
+
+
 def armed_before(heartbeats: HeartbeatHistory, moment: float, longest: float) -> bool:
-    """True if the last heartbeat before `moment` was armed and at most `longest` seconds older."""
+    """True if the last heartbeat before `moment` was armed, at most `longest` seconds older, and none was missed."""
     for run in reversed(heartbeats.runs):
         if run.first < moment:
             # a run that spans the moment has a heartbeat before it at an unknown time
-            return run.armed and moment - min(run.last, moment) <= longest
+            return run.armed and moment - min(run.last, moment) <= longest and run.missed_at >= moment
     return False

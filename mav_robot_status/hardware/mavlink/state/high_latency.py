@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....interface.status import TriState
 from ....mavlink.definitions import Heartbeat
@@ -25,7 +25,6 @@ from ....mavlink.enumerations import (
     MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
     MAV_MODE_FLAG_SAFETY_ARMED,
 )
-from ....values import NamedTuple
 from ..identity import ROVER, family_of
 
 if TYPE_CHECKING:

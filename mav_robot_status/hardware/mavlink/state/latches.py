@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ....values import NamedTuple
 from ..causes import CAUSES, EVENTS, TERMINATION_ANNOUNCED, TIMED_TEXTS, Clears
 
 if TYPE_CHECKING:

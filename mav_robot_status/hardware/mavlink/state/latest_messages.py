@@ -6,11 +6,10 @@ Records that each message changes in place, because this runs for every message,
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from itertools import pairwise
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final
-
-from ....values import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,9 +6,8 @@ until it moves, whatever its motors do.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
-
-from ....values import dataclass
 
 if TYPE_CHECKING:
     from .motion import Motion

@@ -6,10 +6,10 @@ The last sample holds until the next.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from ....interface.status import TriState
-from ....values import dataclass
 
 if TYPE_CHECKING:
     from ..options import HardwareOptions

@@ -9,11 +9,10 @@ grows. A motor that is switched off while armed, without such proof, is only a r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from ....mavlink import enumerations as mavlink
-from ....values import dataclass
 from ..identity import PLANE, ROVER, Family
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ LEAST_PULSE: Final = 800  # us: a lower output is switched off, and proves nothi
 SEVERAL: Final = 3  # motors that all leave their stop value when armed: only a multirotor does that
 DEMAND: Final = 15  # %: VFR_HUD.throttle from which an output at stop is suspicious
 HOLD: Final = 0.95  # s: one second, less the jitter of a stream
-SWITCHED_OFF: Final = 1.5  # s: longer than the heartbeat that shows a disarm may be late
+SWITCHED_OFF: Final = 1.4  # s: longer than the heartbeat that shows a disarm may be late, less the jitter of a stream
 FOLLOWS: Final = 0.2  # relative: the pulse per percent of throttle may differ by this much at two throttles
 LOW_THROTTLE, HIGH_THROTTLE = 60, 75  # %: one of the throttles is at most the first, the other at least the second
 LEAST_SLOPE: Final = 5.0  # us per percent: no control surface is that far off at such a throttle
@@ -84,6 +83,9 @@ class Watch:
     held_since: float | None = None
     held: bool = False
     """Whether the outputs were at stop again after HOLD, and a throttle that arrived in between was demanded."""
+    idle_since: float | None = None
+    idle: bool = False
+    """As `held`, without a proof that the channels are motors, and that they were driven."""
     speed_then: float = 0.0
     """Speed over ground of a rover or a plane when the hold began, m/s."""
     at: float | None = None
@@ -131,7 +133,7 @@ def heard_outputs(
     watch.at, watch.values = now, values
     if not heartbeats.armed:
         watch.candidate, watch.driven, watch.held_since, watch.off_since = values, False, None, None
-        watch.held = False
+        watch.held, watch.idle_since, watch.idle = False, None, False
         return
     motors, assumed = channels(watch, vehicle_type)
     known = _distances(watch, motors)
@@ -149,6 +151,12 @@ def heard_outputs(
     demanded = throttle is not None and throttle >= DEMAND
     if not watch.proved:
         watch.proved = _is_proof(watch, known, motors, assumed, vehicle_type, throttle if demanded else None)
+    if not (at_stop and demanded):
+        watch.idle_since, watch.idle = None, False
+    elif watch.idle_since is None:
+        watch.idle_since = now
+    elif now >= watch.idle_since + HOLD and throttle_at > watch.idle_since:
+        watch.idle = True
     if not (at_stop and demanded and watch.proved and watch.driven_seen):
         watch.held_since, watch.held = None, False
     elif watch.held_since is None:

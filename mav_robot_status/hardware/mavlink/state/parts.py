@@ -6,9 +6,7 @@ A part is known while it reports a fault. One report without the fault ends it, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
-
-from ....values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from ....clock import Instant

@@ -7,7 +7,7 @@ neither the function nor the position: it counts only if all outstanding command
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....mavlink.enumerations import (
     MAV_CMD_COMPONENT_ARM_DISARM,
@@ -15,7 +15,6 @@ from ....mavlink.enumerations import (
     MAV_CMD_DO_FLIGHTTERMINATION,
     MAV_RESULT_IN_PROGRESS,
 )
-from ....values import NamedTuple
 from .estop import ARM_EMERGENCY_STOP, MOTOR_ESTOP
 
 if TYPE_CHECKING:

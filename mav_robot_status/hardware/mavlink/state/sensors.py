@@ -6,11 +6,10 @@ The profile defines the meaning of a faulty bit.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....interface.status import TriState
 from ....mavlink import enumerations as mavlink
-from ....values import NamedTuple
 from ..autopilots.sensor_weights import EXTENDED_BITS, HARD, SOFT, Weight, bit_of
 
 if TYPE_CHECKING:

@@ -6,9 +6,7 @@ last. PX4 gives every text an id, and ends those that also exist as EVENT with a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
-
-from ....values import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ....clock import Instant
 from ....mavlink.enumerations import MAV_VTOL_STATE_MC, MAV_VTOL_STATE_UNDEFINED
-from ....values import NamedTuple, dataclass
 from ..autopilots import announced_as
 from ..identity import FIXED_PITCH, Family, family_of, sensor_name
 from . import (
@@ -44,6 +43,9 @@ if TYPE_CHECKING:
     from ..px4_events import EventTable
     from .applet import Applet
     from .high_latency import HighLatency
+
+EXPLAINS: Final = 2.0
+"""Seconds around a disarm within which a text may tell why."""
 
 
 class Statement(NamedTuple):
@@ -77,6 +79,12 @@ class VehicleState:
     """Whether `booted` is by its clock."""
     arrived: float = -math.inf
     """When the latest news of any kind arrived while the link was alive, monotonic seconds."""
+    lost_at: float = -math.inf
+    """Since when frames were lost, the latest time, monotonic seconds."""
+    disarmed_at: float | None = None
+    """When it was last disarmed in motion; None: it was armed since."""
+    unexplained: bool = False
+    """Whether it was disarmed in motion, and frames that may tell why are lost."""
     timeout: float | None = field(default=None, compare=False)
     """Seconds after which its link counts as lost, if the site says so. It is given from outside."""
     told_armed: float = -math.inf
@@ -178,6 +186,12 @@ class VehicleState:
         for name in self.__slots__:
             if name not in ("event_table", "timeout", "arrived"):
                 setattr(self, name, getattr(other, name))
+
+    def note_loss(self, since: float) -> None:
+        """Note that frames are lost since a time."""
+        self.lost_at = since
+        if self.disarmed_at is not None and abs(since - self.disarmed_at) <= EXPLAINS:
+            self.unexplained = True
 
     def show(self, profile: Autopilot) -> None:
         """Note that its software is this one, although it announces another one."""

@@ -202,6 +202,12 @@ class Flight:
     def _take(self, message: Any, ids: Ids) -> None:
         self.hw.take(frame_of(message, ids, self._numbers.next(ids)), self.clock.now())
 
+    def lose(self, frames: int = 1) -> Flight:
+        """Send this many frames that do not arrive."""
+        for _ in range(frames):
+            self._numbers.next((1, 1))
+        return self
+
     def stream(self, name: str, message: Callable[[], Any], hz: float = 1.0, ids: Ids = (1, 1)) -> Flight:
         """Send this message at this rate from now on."""
         self._streams[name] = Stream(message, round(1e6 / hz), self._us, ids)

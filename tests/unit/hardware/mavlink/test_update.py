@@ -172,7 +172,7 @@ def test_a_person_who_arms_disarms_and_arms_again_is_not_a_conflict() -> None:
     assert (air.codes, air.drives) == ([], TRUE)
 
 
-def test_a_frame_that_was_held_back_does_not_overturn_a_newer_one() -> None:
+def test_an_armed_heartbeat_that_was_held_back_makes_disarmed_unknown_until_the_next_one() -> None:
     air = Air()
     air.beat(armed=True, sequence=10)
     air.wait(1.0)
@@ -180,7 +180,21 @@ def test_a_frame_that_was_held_back_does_not_overturn_a_newer_one() -> None:
     air.wait(0.2)
     air.beat(armed=True, sequence=11)
     air.wait(0.1)
+    assert air.drives is UNKNOWN
+    air.beat(sequence=13)
+    air.wait(0.1)
     assert air.drives is FALSE
+
+
+def test_a_disarmed_heartbeat_that_was_held_back_changes_nothing() -> None:
+    air = Air()
+    air.beat(sequence=10)
+    air.wait(1.0)
+    air.beat(armed=True, sequence=12)
+    air.wait(0.2)
+    air.beat(sequence=11)
+    air.wait(0.1)
+    assert air.drives is TRUE
 
 
 # -- several channels --------------------------------------------------------------------------------------------------

@@ -9,7 +9,8 @@ import pytest
 
 from mav_robot_status.clock import later
 from mav_robot_status.errors import UsageError
-from mav_robot_status.hardware.simple_message.interface import SILENCE, SimpleMessageRobotHW
+from mav_robot_status.hardware.simple_message.interface import SimpleMessageRobotHW
+from mav_robot_status.hardware.tcp_arm import SILENCE
 from mav_robot_status.interface import HardwareContext, HardwareInterface, LinkState, RobotMode, RobotStatus, TriState
 from mav_robot_status.simple_message import LONGEST_LENGTH, StatusEncoder
 from mav_robot_status.testing.conformance.hardware import Driver, HardwareConformance, Robot

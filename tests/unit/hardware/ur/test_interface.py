@@ -10,7 +10,8 @@ import pytest
 
 from mav_robot_status.clock import later
 from mav_robot_status.errors import UsageError
-from mav_robot_status.hardware.ur.interface import SILENCE, UrRobotHW
+from mav_robot_status.hardware.tcp_arm import SILENCE
+from mav_robot_status.hardware.ur.interface import UrRobotHW
 from mav_robot_status.hardware.ur.rtde import LONGEST
 from mav_robot_status.interface import HardwareContext, HardwareInterface, LinkState, RobotMode, RobotStatus, TriState
 from mav_robot_status.testing.conformance.hardware import Driver, HardwareConformance, Robot

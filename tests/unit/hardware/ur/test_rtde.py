@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_robot_status.hardware.ur.rtde import ProtocolError, Session, Step
+from mav_robot_status.errors import ProtocolError
+from mav_robot_status.hardware.ur.rtde import Session, Step
 
 NAMES = ("robot_mode", "actual_qd")
 

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_robot_status.hardware.ur.status import MODES, Context, Joints, Sample, Values, sample_of, values_of
+from mav_robot_status.hardware.tcp_arm import Values
+from mav_robot_status.hardware.ur.status import MODES, Context, Joints, Sample, sample_of, values_of
 from mav_robot_status.interface import Detail, RobotMode, TriState, validate
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN

@@ -77,6 +77,21 @@ def test_a_number_of_a_frame_that_says_nothing_is_not_missing() -> None:
     assert count.place(4, 0.4) is None
 
 
+def test_a_number_ahead_that_is_used_stays_so_until_the_count_has_reached_it() -> None:
+    count = heard((0.0, 1))
+    count.fill(5)
+    count.advance(2, 0.1, 0.1)
+    count.advance(4, 0.2, 0.2)
+    assert (count.place(5, 0.3), count.place(4, 0.3)) == (None, -3)
+
+
+def test_late_frames_are_dated_in_the_order_of_their_numbers() -> None:
+    count = heard((0.0, 1), (0.1, 5))
+    later = count.said_behind(2, 0.2)
+    earlier = count.said_behind(3, 0.3)
+    assert 0.0 < earlier < later < 0.1
+
+
 def test_a_sender_whose_number_never_changes_is_one_count_and_a_changing_one_has_no_number_twice() -> None:
     count = heard((0.0, 7))
     for at in (1.0, 2.0):

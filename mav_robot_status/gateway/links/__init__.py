@@ -1,0 +1,1 @@
+"""The live links: who is there, what is received, what is sent."""

@@ -1,0 +1,1 @@
+"""The frames of a recorded log, each with its time."""

@@ -92,8 +92,6 @@ def _ends(one: Trouble, state: State, line: JsonMapping) -> str:
         return "Emergency stop released" if released else "Emergency stop: unknown whether it is released"
     if one.state is LOST:
         return f"Heard again: {state.word}"
-    if one.state is UNKNOWN:
-        return f"Known again: {state.word}"
     return f"{one.state.word.capitalize()} ended: {one.why}" if one.why else f"{one.state.word.capitalize()} ended"
 
 
@@ -170,6 +168,8 @@ class NamedValuePublisher(RateLimitedPublisher[_Sent]):
         if settled is not None and settled.status == msg.status and settled.detail == msg.detail:
             return math.inf
         line = members(msg.handle, msg.status, msg.detail)
+        if state_of(line) is not UNKNOWN:  # what is known again is told by what it is
+            sent.known = {key: one for key, one in sent.known.items() if one.state is not UNKNOWN}
         found = texts(line, msg.status.mode, sent.mode, sent.known, msg.heartbeat_age)
         while found:
             first = found[0]

@@ -164,6 +164,13 @@ def test_a_lost_vehicle_says_for_how_long_nothing_is_heard_and_a_loss_ends_no_er
     assert texts(port.taken()) == [(4, "LOST: nothing heard for 4 s"), (6, "Heard again: MOVING")]
 
 
+def test_what_is_not_known_is_told_each_time_and_its_end_is_not(mirror: NamedValuePublisher, port: Port) -> None:
+    unsure = FREE._replace(drives_powered=TriState.UNKNOWN, motion_possible=TriState.UNKNOWN, in_motion=TriState.FALSE)
+    still = FREE._replace(in_motion=TriState.FALSE)
+    steps = [(at * 5.0, status, Detail(1, 1)) for at, status in enumerate((unsure, still, unsure))]
+    assert said(mirror, port, *steps) == [(5, "UNKNOWN: whether it can move is not known")] * 2
+
+
 def test_a_stop_of_which_nothing_is_known_is_not_called_released(mirror: NamedValuePublisher, port: Port) -> None:
     found = said(mirror, port, (0.0, STOPPED, Detail(1, 1)), (5.0, DRIVING, Detail(1, 1)))
     assert found[-1] == (6, "Emergency stop: unknown whether it is released")

@@ -87,6 +87,8 @@ FIRST_WORDS: Final = {
     "E_STOPPED": "Emergency stop engaged",
 }
 """What the first sentence calls a cause."""
+UNTOLD: Final = UNSURE | {"E_STOPPED"}
+"""The inhibits that another sentence tells."""
 
 
 def headline(line: Line, last: Line | None = None, members: Mapping[str, Line] | None = None) -> Headline:
@@ -171,7 +173,7 @@ def _wrong(line: Line, state: State) -> Iterator[Sentence]:
         if text:
             yield Sentence(_member(one.cause) + ("Also:" if n else "Cannot arm:"), None, str(text))
         elif not n:
-            yield Sentence("Cannot arm" if said == "it cannot be armed" else f"Cannot arm: {said}")
+            yield Sentence(f"Cannot arm: {'no reason was reported' if said == 'it cannot be armed' else said}")
         elif said != "it cannot be armed":
             yield Sentence(_begun(said))
 
@@ -181,14 +183,11 @@ def _standing(line: Line, state: State) -> Iterator[Sentence]:
     if line.get("motion_possible") is not False:
         yield from (MAY_START,) if state is not MOVING and not line.get("members") else ()
         return
-    said = _inhibits(line)
-    if state is not MOVING and state is not ARMED:
-        told = {id(one.cause) for one in troubles(line)} | {id(one.cause) for one in cannot_arm(line)}
-        said = [one for one in said if id(one) not in told and one.get("name") != "E_STOPPED"]
-    words = ", ".join(dict.fromkeys(sentence(one, line) for one in said if one.get("name") not in UNSURE))
+    told = {id(one.cause) for one in (*troubles(line), *cannot_arm(line))}
+    said = [one for one in _inhibits(line) if id(one) not in told and one.get("name") not in UNTOLD]
+    words = ", ".join(dict.fromkeys(sentence(one, line) for one in said))
     if state in (MOVING, ARMED):
         yield Sentence(f"It ignores motion commands: {words}" if words else "It ignores motion commands")
-        yield from (_quoted(one, line) for one in said if one.get("text"))
     elif troubles(line):
         yield from (Sentence(_begun(words.removeprefix("it is "))),) if words else ()
     elif words:

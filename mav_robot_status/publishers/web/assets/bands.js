@@ -45,7 +45,7 @@ export function bands(line, transitions, keptFor, dataUntil, now) {
       labels.unshift(`not kept before ${clock(now - known * 1000).slice(0, 5)}`);
       const note = make("small", { "aria-hidden": "true" }, labels[0]);
       note.style.right = `${(100 * known) / WINDOW}%`;
-      if (known < WINDOW * 0.7) label.append(note);
+      if (known < WINDOW * 0.85) label.append(note);
       drawing.prepend(draw("title", {}, labels[0]));
     }
     drawing.setAttribute("aria-label", `${field.title}: ${labels.join("; ")}`);

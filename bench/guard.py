@@ -20,7 +20,7 @@ from mav_robot_status.clock import Instant, later
 from mav_robot_status.config import Config, LinkConfig
 from mav_robot_status.gateway.event_loop import EventLoop
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.mavlink.framing import Parser
 
 from . import workload
@@ -83,7 +83,7 @@ def take() -> Iterator[Work]:
     """Process the frames that a status needs."""
     frames = Parser(WANTED_IDS).feed(b"".join(workload.frames(FRAMES)))
     hw = MavlinkRobotHW()
-    yield lambda: [hw.take(frame, later(START, i / 9.2)) for i, frame in enumerate(frames)], len(frames)
+    yield lambda: [hw.on_frame(frame, later(START, i / 9.2)) for i, frame in enumerate(frames)], len(frames)
 
 
 @contextmanager
@@ -149,7 +149,7 @@ def fleet_turns() -> Iterator[Work]:
         for number in range(FLEET):
             now = later(START, number / FLEET / 10)
             for frame in frames:
-                gateway.hardware.mavlink.vehicles.take(frame._replace(ids=(1 + number, 1)), now)
+                gateway.hardware.mavlink.vehicles.on_frame(frame._replace(ids=(1 + number, 1)), now)
             gateway.turn(now)
         now = later(START, 1.0)  # later than all that their first messages change
         gateway.turn(now)
@@ -159,7 +159,7 @@ def fleet_turns() -> Iterator[Work]:
 COUNTED: Final[dict[str, Callable[[], AbstractContextManager[Work]]]] = {
     "Parser.feed, 1400 bytes: per frame": parse_stream,
     "Parser.feed, a datagram: per frame": parse_datagrams,
-    "MavlinkRobotHW.take: per frame that is needed": take,
+    "MavlinkRobotHW.on_frame: per frame that is needed": take,
     "EventLoop.run: per turn with a datagram": wake_ups,
     "EventLoop.turn: with a HEARTBEAT that arms": changes,
     "EventLoop.turn: nothing to do": idle_turns,
@@ -188,7 +188,7 @@ def _with_vehicle() -> Iterator[tuple[EventLoop, Instant]]:
     with _gateway(lambda: START) as (gateway, _):
         for i, frame in enumerate(Parser(WANTED_IDS).feed(b"".join(workload.frames(FRAMES)))):
             now = later(START, i / 9.2)
-            gateway.hardware.mavlink.vehicles.take(frame, now)
+            gateway.hardware.mavlink.vehicles.on_frame(frame, now)
         gateway.turn(now)
         yield gateway, now
 

@@ -11,17 +11,17 @@ import sys
 from collections.abc import Iterable, Iterator
 
 from mav_robot_status.gateway import plugins
-from mav_robot_status.hardware.mavlink import causes, identity
+from mav_robot_status.hardware.mavlink import identity
 from mav_robot_status.hardware.mavlink.autopilots import AUTOPILOTS, ardupilot, inav, px4
 from mav_robot_status.hardware.mavlink.autopilots import modes as standard
 from mav_robot_status.hardware.mavlink.autopilots import texts as common
 from mav_robot_status.hardware.mavlink.autopilots.sensor_weights import EXTENDED_BITS
 from mav_robot_status.hardware.mavlink.autopilots.texts import TextRule, When
 from mav_robot_status.hardware.mavlink.autopilots.wanted import Wanted
+from mav_robot_status.hardware.mavlink.faults import causes, sensors
 from mav_robot_status.hardware.mavlink.identity import sensor_name
+from mav_robot_status.hardware.mavlink.readiness.rule import INHIBITS
 from mav_robot_status.hardware.mavlink.requests.message_intervals import wanted_of
-from mav_robot_status.hardware.mavlink.rules.inhibits import INHIBITS
-from mav_robot_status.hardware.mavlink.state import sensors
 from mav_robot_status.interface import RobotMode
 from mav_robot_status.interface.options import Declared
 from mav_robot_status.mavlink.definitions import TYPE_NAMES

@@ -67,7 +67,7 @@ class Source:
             for model, number, parser, rates in self._feeds:
                 for outgoing in model.run(now):
                     for frame in parser.feed(outgoing.frame(number)):
-                        self._pipeline.vehicles.take(frame, now)
+                        self._pipeline.vehicles.on_frame(frame, now)
                         rates.take(frame.message_id, now.mono)
             self._pipeline.tick(now)
 

@@ -9,15 +9,15 @@ from mav_robot_status.clock import Instant
 from mav_robot_status.config.document import parse_document
 from mav_robot_status.config.reader import build
 from mav_robot_status.errors import ConfigError, UsageError
+from mav_robot_status.hardware.mavlink.faults import text_assembly
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.hardware.mavlink.px4_events import ARMING_SUMMARY, HEALTH_SUMMARY
 from mav_robot_status.hardware.mavlink.px4_events.ids import CAUSE_AT
 from mav_robot_status.hardware.mavlink.px4_events.parsing import TableError
 from mav_robot_status.hardware.mavlink.px4_events.parsing import parse as parse_table
-from mav_robot_status.hardware.mavlink.state import text_assembly
-from mav_robot_status.hardware.mavlink.state.event_sequence import ASKABLE, KEPT
+from mav_robot_status.hardware.mavlink.px4_events.sequence import ASKABLE, KEPT
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.definitions import MESSAGES, CurrentEventSequence, Event, Heartbeat, Statustext
 from mav_robot_status.mavlink.encode import enclose, encode
@@ -86,7 +86,7 @@ def messages(data: bytes) -> int:
         message_id = 0 if count <= 3 else SOME[chunk[2] % len(SOME)]
         now = Instant(mono, int(mono * 1e6))
         (frame,) = parser.feed(enclose(message_id, chunk[3:], system=system, component=1, sequence=count & 255))
-        hw.take(frame, now)
+        hw.on_frame(frame, now)
         if mono >= hw.next_due():
             hw.read(now)
             hw.due_requests(now)
@@ -158,7 +158,7 @@ def events(data: bytes) -> int:
         beat = Heartbeat(4 << 16, 2, 12, 209, 4, 3)
         for number, message in enumerate((beat, _event(chunk, count))):
             (frame,) = parser.feed(encode(message, system=1, component=1, sequence=2 * count + number & 255))
-            hw.take(frame, now)
+            hw.on_frame(frame, now)
         hw.read(now)
         hw.due_requests(now)
     (tracked,) = hw.vehicles

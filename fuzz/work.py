@@ -13,7 +13,7 @@ from binascii import crc_hqx
 from typing import TYPE_CHECKING, Any, Final
 from unittest import mock
 
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.mavlink import framing
 from mav_robot_status.mavlink.framing import Parser
 

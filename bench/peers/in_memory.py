@@ -21,7 +21,7 @@ REPEAT: Final = 8  # passes over the frames
 
 def parse_ours(pieces: list[bytes], _: str) -> Callable[[], int]:
     """Our parser with the messages of a status. It counts lost frames and checks the CRC of each known frame."""
-    from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+    from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
     from mav_robot_status.mavlink.framing import Parser
 
     parser = Parser(WANTED_IDS)
@@ -97,7 +97,7 @@ def replay_typed(_: list[bytes], path: str) -> Callable[[], int]:
     os.environ["MAVLINK20"] = "1"
     from pymavlink import mavutil
 
-    from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+    from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
     from mav_robot_status.mavlink.definitions import MESSAGES
 
     kinds = [MESSAGES[i].name for i in WANTED_IDS]

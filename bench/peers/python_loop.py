@@ -11,7 +11,7 @@ import sys
 import time
 from typing import Any
 
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.mavlink.decode import text
 from mav_robot_status.mavlink.framing import Parser
 

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, Literal, cast, get_args, get_origin, g
 from ..errors import ConfigError, UsageError
 from ..hardware.group import Rule
 from ..hardware.join import Logic
-from ..hardware.mavlink.autopilots.mode_names import numbers
+from ..hardware.mavlink.autopilots import mode_numbers
 from ..hardware.mavlink.options import CustomMode, ModeOverrides, OneOf, Or, Within
 from ..interface import RobotMode
 from ..links import url
@@ -211,7 +211,7 @@ def _rule(node: Node) -> Rule:
 def _mode_overrides(node: Node) -> dict[int, RobotMode]:
     """The modes to publish, by custom_mode. The key of the node is the vehicle family, which gives the mode names."""
     family = node.key.text if node.key else ""
-    known = numbers(family)
+    known = mode_numbers(family)
     found: dict[int, RobotMode] = {}
     for name, value in entries(node).items():
         key = value.key or value

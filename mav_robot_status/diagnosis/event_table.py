@@ -18,7 +18,7 @@ from ..gateway.event_loop import EventLoop
 from ..gateway.mavlink_hardware import MavlinkHardware
 from ..hardware.mavlink.autopilots.wanted import METADATA
 from ..hardware.mavlink.px4_events.parsing import MOST_UNPACKED
-from ..hardware.mavlink.state.vehicle_state import VehicleState
+from ..hardware.mavlink.state import VehicleState
 from ..mavlink.ftp import metadata
 from ..streams import NO_OUTPUT
 from .explain import silent

@@ -6,15 +6,14 @@ from typing import Final
 
 from ..clock import Instant, rfc3339
 from ..hardware.mavlink.autopilots import ARDUPILOT
+from ..hardware.mavlink.estop.applet import EMERGENCY_STOP, SAFETY_SWITCH
 from ..hardware.mavlink.interface import MavlinkRobotHW
 from ..hardware.mavlink.px4_events import EventTable
 from ..hardware.mavlink.px4_events.ids import ALL_MODES
 from ..hardware.mavlink.px4_events.table import component_words
-from ..hardware.mavlink.state import arming_report
-from ..hardware.mavlink.state.applet import EMERGENCY_STOP, SAFETY_SWITCH
-from ..hardware.mavlink.state.arming_reasons import failing, words
-from ..hardware.mavlink.state.arming_report import Check
-from ..hardware.mavlink.state.vehicle_state import VehicleState
+from ..hardware.mavlink.readiness import arming_report
+from ..hardware.mavlink.readiness.arming_report import Check, failing, words
+from ..hardware.mavlink.state import VehicleState
 from ..json_object import JsonObject
 
 PAGE: Final = "docs/ardupilot-applet.md"

@@ -104,7 +104,7 @@ class MavlinkHardware:
         """Whether the tables of PX4's events are looked for, in the cache and on the vehicles."""
         self.tables.wanted = wants_tables(config)
         self.vehicles.ask_for_tables(self.tables.wanted)
-        self.vehicles.hear_file = self.tables.on_message
+        self.vehicles.on_file = self.tables.on_message
 
     # reload
 
@@ -158,9 +158,9 @@ class MavlinkHardware:
 
     def process(self, received: Sequence[tuple[Frame, Channel]], now: Instant) -> None:
         """Process frames that arrived at `now`. The observers get those of vehicles."""
-        hub, take = self.hub, self.vehicles.take
+        hub, on_frame = self.hub, self.vehicles.on_frame
         for frame, channel in received:
-            vehicle = take(frame, now, channel, hub.receiver.lag(frame))
+            vehicle = on_frame(frame, now, channel, hub.receiver.lag(frame))
             if vehicle is not None and vehicle.ids is not None:
                 hub.members.heard_vehicle(vehicle.ids, channel, now.mono)
         for observer in self.observers:

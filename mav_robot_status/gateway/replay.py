@@ -111,7 +111,7 @@ def run_through(pipeline: ReplayPipeline, recording: Iterable[Stamped]) -> Insta
         last = now
         if frame is None:
             continue
-        hw.take(frame, now, pipeline.source)
+        hw.on_frame(frame, now, pipeline.source)
         if hw.deadline == -math.inf:
             pipeline.tick(now)
             due = pipeline.next_due(now.mono)

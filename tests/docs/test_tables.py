@@ -18,9 +18,9 @@ from mav_robot_status.config.reader import PARAMETERS
 from mav_robot_status.controller import DEFAULT_PUBLISH_RATE
 from mav_robot_status.gateway.controller_config import DEFAULT_PUBLISHERS
 from mav_robot_status.hardware.group import NOT_POSSIBLE
-from mav_robot_status.hardware.mavlink.causes import CAUSES
+from mav_robot_status.hardware.mavlink.faults.causes import CAUSES
 from mav_robot_status.hardware.mavlink.options import HardwareOptions, Or, Within
-from mav_robot_status.hardware.mavlink.rules.inhibits import INHIBITS
+from mav_robot_status.hardware.mavlink.readiness.rule import INHIBITS
 from mav_robot_status.hardware.simple_message.interface import SimpleMessageHardwareOptions
 from mav_robot_status.hardware.simple_message.status import NO_CODE
 from mav_robot_status.hardware.ur.interface import UrOptions

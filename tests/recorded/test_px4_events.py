@@ -11,7 +11,7 @@ from mav_robot_status.gateway.logs.recorded_log import Recording
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.px4_events import EventTable
 from mav_robot_status.hardware.mavlink.px4_events.parsing import parse
-from mav_robot_status.hardware.mavlink.rules.arming import can_arm
+from mav_robot_status.hardware.mavlink.readiness.rule import can_arm
 from mav_robot_status.mavlink.definitions import Event, SysStatus
 
 from .replays import HERE, SHARED
@@ -30,7 +30,7 @@ def counted(path: Path, table: EventTable | None) -> Counter[str]:
     for now, frame, _ in Recording(str(path)):
         if frame is None:
             continue
-        hw.take(frame, now)
+        hw.on_frame(frame, now)
         hw.read(now)
         vehicle = hw.find(1, 1)
         if vehicle is None or not vehicle.facts or frame[1] != (1, 1):

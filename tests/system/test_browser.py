@@ -382,7 +382,8 @@ def test_everything_fits_on_a_phone(browser: Browser, page: Page) -> None:
     for lines in (scenes.fleet(12), [scenes.in_error("a-robot-with-a-long-name-1")], [scenes.lost("rover")]):
         look_at(browser, page, lines)
         assert browser.ask(OUTSIDE) == []
-        halves = "[...document.querySelectorAll('.why-cell span')].map((one) => one.parentElement.clientHeight - one.offsetHeight)"
+        spans = "[...document.querySelectorAll('.why-cell span')]"
+        halves = f"{spans}.map((one) => one.parentElement.clientHeight - one.offsetHeight)"
         assert min(browser.ask(f"return {halves}"), default=0) >= 0  # no half line
     assert browser.ask("return parseFloat(getComputedStyle(document.querySelector('#verdict strong')).fontSize)") >= 28
     assert browser.ask("return document.querySelector('#verdict').getBoundingClientRect().bottom < innerHeight")

@@ -8,9 +8,9 @@ from typing import Final
 
 from ...clock import Instant
 from ...gateway.observer import Observer
+from ...hardware.mavlink.estop.applet import is_word, value_of
 from ...hardware.mavlink.identity import is_autopilot
-from ...hardware.mavlink.state.applet import is_word, value_of
-from ...hardware.mavlink.state.high_latency import stated
+from ...hardware.mavlink.satellite.state import stated
 from ...links.base import Address
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters

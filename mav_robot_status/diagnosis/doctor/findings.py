@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from ...hardware.mavlink.autopilots.wanted import Wanted
+from ...hardware.mavlink.estop.applet import FRESH
 from ...hardware.mavlink.identity import named
 from ...hardware.mavlink.senders import LATE, Sender, Strangers
-from ...hardware.mavlink.state.applet import FRESH
 from ...links.url import Url
 from ...mavlink import definitions as mav
 from ...mavlink.counters import Counters

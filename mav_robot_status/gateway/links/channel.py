@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from ...hardware.mavlink.message_table import IDS_WITH_FILES, WANTED_IDS
+from ...hardware.mavlink.subjects import IDS_WITH_FILES, WANTED_IDS
 
 if TYPE_CHECKING:
     from ...links.base import Address

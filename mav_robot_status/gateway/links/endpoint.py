@@ -6,7 +6,7 @@ import logging
 import shlex
 from typing import TYPE_CHECKING, Final
 
-from ...hardware.mavlink.message_table import WANTED_IDS
+from ...hardware.mavlink.subjects import WANTED_IDS
 from ...links.base import IDLE, SPEAKS, STAYS, ServesClients
 from ...links.guarded import open_guarded
 from ...links.udp import UdpBroadcaster, UdpSender

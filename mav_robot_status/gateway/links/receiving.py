@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from ...hardware.mavlink.identity import is_autopilot
-from ...hardware.mavlink.message_table import COMMAND_IDS
+from ...hardware.mavlink.subjects import COMMAND_IDS
 from ...mavlink.commands import HEARTBEAT
 from ...mavlink.signing import ACCEPTED, Verdict
 from .arrival import BATCH, USUAL, Arrivals, Pause

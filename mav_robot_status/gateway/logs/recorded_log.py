@@ -6,7 +6,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 from ...errors import UsageError
-from ...hardware.mavlink.message_table import WANTED_IDS
+from ...hardware.mavlink.subjects import WANTED_IDS
 from ...links.log import Counts, LogReader, timed
 from ...mavlink.framing import Parser
 from .raw_log import AutopilotClock, is_raw

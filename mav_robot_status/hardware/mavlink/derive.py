@@ -12,18 +12,17 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from ...interface.fields import STATES
 from ...interface.status import Detail, Inhibit, LinkState, RobotMode, RobotStatus, Vehicle
 from ...mavlink.definitions import AUTOPILOT_NAMES, STATE_NAMES, TYPE_NAMES
-from . import causes
+from .estop.rule import e_stopped
+from .faults import causes
+from .faults.rule import active_errors, in_error
+from .heartbeat.rule import flight_mode, heartbeat_words, mode_number_words
 from .identity import named
-from .rules import high_latency
-from .rules.arming import can_arm
-from .rules.claimed import CLAIMED
-from .rules.drives_powered import drives_powered, motion_possible
-from .rules.e_stopped import e_stopped
-from .rules.errors import active_errors, in_error
-from .rules.flight_mode import flight_mode
-from .rules.in_motion import in_motion
-from .rules.inhibits import inhibit, inhibits
-from .rules.reason import TRUE, UNKNOWN, Reason, Source
+from .motion.rule import in_motion
+from .power import drives_powered, motion_possible
+from .readiness.rule import can_arm, inhibit, inhibits
+from .reason import CLAIMED, TRUE, UNKNOWN, Reason
+from .satellite import rule as high_latency
+from .satellite.rule import high_latency_words
 
 if TYPE_CHECKING:
     from ...clock import Instant
@@ -40,8 +39,8 @@ class Derived(NamedTuple):
     reasons: Mapping[str, Reason]
 
 
-LATE: Final = Reason("frames arrive, but the latest HEARTBEAT is old", Source.HEARTBEAT)
-LOST: Final = Reason("no frame within heartbeat_timeout", Source.HEARTBEAT)
+LATE: Final = Reason("frames arrive, but the latest HEARTBEAT is old", heartbeat_words)
+LOST: Final = Reason("no frame within heartbeat_timeout", heartbeat_words)
 
 
 def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, options: HardwareOptions) -> Derived:
@@ -51,7 +50,10 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
     mode = flight_mode(facts, options)
     found = _seldom(facts.seldom, facts, options, mode) if facts.seldom else _found(facts, options, mode)
     errors = active_errors(facts)
-    found["mode"], found["in_error"] = (mode.mode, Reason(mode.rule, Source.MODE_NUMBER)), in_error(facts, errors)
+    found["mode"], found["in_error"] = (
+        (mode.mode, Reason(mode.rule, high_latency_words if facts.seldom else mode_number_words)),
+        in_error(facts, errors),
+    )
     hidden = _hidden(facts)
     if hidden is not None:
         name, why, fields = hidden
@@ -75,6 +77,11 @@ def derive(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opt
     return Derived(status, detail, {field: reason for field, (_, reason) in found.items()})
 
 
+def _missing(why: Reason, facts: Facts) -> Reason:
+    """The reason that a HEARTBEAT is missing; of a vehicle behind a satellite, a HIGH_LATENCY2."""
+    return why._replace(words=high_latency_words) if facts.seldom else why
+
+
 Hidden = tuple[str, Reason, "tuple[str, ...]"]
 """Why fields are unknown: the inhibit, the reason, and the fields beside the mode."""
 
@@ -87,7 +94,7 @@ def _hidden(facts: Facts) -> Hidden | None:
     if fresh.heartbeat:
         return None
     moves = () if fresh.velocity is not None or fresh.landed_state or fresh.gps else ("in_motion",)
-    return "HEARTBEAT_LATE", LATE, ("e_stopped", "drives_powered", "motion_possible", *moves)
+    return "HEARTBEAT_LATE", _missing(LATE, facts), ("e_stopped", "drives_powered", "motion_possible", *moves)
 
 
 def _found(facts: Facts, options: HardwareOptions, mode: FlightMode) -> dict[str, tuple[Any, Reason]]:
@@ -127,7 +134,7 @@ def _lost(facts: Facts, ids: tuple[int, int], before: Detail, now: Instant, opti
         since = next((e.since_us for e in before.errors if e.code == causes.LINK_LOST), now.unix_us)
         status = status._replace(in_error=TRUE, error_code=causes.LINK_LOST)
         detail = detail._replace(errors=(causes.error(causes.LINK_LOST, None, since),))
-    return Derived(status, detail, dict.fromkeys((field.name for field in STATES), LOST))
+    return Derived(status, detail, dict.fromkeys((field.name for field in STATES), _missing(LOST, facts)))
 
 
 def _vehicle(facts: Facts) -> Vehicle:

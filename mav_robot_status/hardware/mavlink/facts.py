@@ -1,15 +1,17 @@
 """The facts of a vehicle: the complete input of the rules. A new status is derived only when they change.
 
-`settle` makes them from the state. A rule can read nothing else, and every fact is compared. Times of arrival are not
-facts, because each message changes them; `evidence` reads them from the state.
+The subjects make them from the state, see `subjects`. A rule can read nothing else, and every fact is compared. Times
+of arrival are not facts, because each message changes them; the words of a `Reason` read them from the state.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from math import inf, nextafter
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface.status import TriState
 from ...mavlink.enumerations import MAV_MODE_FLAG_SAFETY_ARMED
+from .state import slowly_fresh_until
 
 if TYPE_CHECKING:
     from ...mavlink.definitions import Heartbeat
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from .autopilots.firmware import Firmware
     from .autopilots.modes import ModeHints
     from .identity import Family
+    from .state import Heard
 
 
 class Kind(NamedTuple):
@@ -152,6 +155,9 @@ class Claimed(NamedTuple):
     """Whether the two cannot be told apart, so that nothing is known."""
 
 
+UNDISPUTED: Final = Claimed(None, False)
+
+
 class Seldom(NamedTuple):
     """What HIGH_LATENCY2 says besides the mode."""
 
@@ -244,3 +250,37 @@ class Facts(NamedTuple):
     def armed(self) -> bool:
         """The only armed indication that exists."""
         return bool(self.heartbeat.base_mode & MAV_MODE_FLAG_SAFETY_ARMED)
+
+
+class Deadline:
+    """A time, in monotonic seconds.
+
+    Facts compare all other times through it. `next` is therefore the first time at which a fact may change without a
+    message, and no list of such times is needed.
+    """
+
+    __slots__ = ("next", "now")
+
+    def __init__(self, now: float) -> None:
+        self.now = now
+        self.next = inf
+
+    def has_come(self, at: float) -> bool:
+        """Whether it is `at` or later."""
+        if self.now >= at:
+            return True
+        if at < self.next:
+            self.next = at
+        return False
+
+    def is_within(self, limit: float) -> bool:
+        """Whether it is not later than `limit`."""
+        if self.now > limit:
+            return False
+        if limit < self.next:
+            self.next = nextafter(limit, inf)
+        return True
+
+    def is_fresh(self, what: Heard | None, least: float) -> bool:
+        """Whether `what` is not older than `least` seconds, or than three measured intervals if that is longer."""
+        return what is not None and (self.is_within(what.at + least) or self.is_within(slowly_fresh_until(what)))

@@ -1,6 +1,6 @@
 """`MavlinkRobotHW`: the hardware interface. It processes frames, keeps the state of each vehicle, and sets the handles.
 
-The cycle of ros_control: `take` each frame, `read(time)` into the handles, then send the `due_requests(time)`.
+The cycle of ros_control: `on_frame` for each frame, `read(time)` into the handles, then send the `due_requests(time)`.
 
 Every frame takes one path. `belief` says who spoke, and when; a handler changes the state of that speaker; the vehicle
 is due: at once after an edge (armed, a text, an acknowledgement), else at most SETTLES later. `read` then settles all
@@ -19,26 +19,19 @@ from ...mavlink import definitions as mav
 from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
 from .autopilots.wanted import METADATA
 from .belief import Belief
-from .evidence import EvidenceOfVehicle
-from .handlers import overheard, transmitter_heard
-from .handlers.parts import TRANSMITTERS
+from .estop.applet import is_word
+from .estop.messages import overheard
+from .faults.messages import TRANSMITTERS, transmitter_heard
 from .identity import is_autopilot, named
-from .message_table import (
-    APPLET_ID,
-    ARM_STATUS_ID,
-    COMMAND_IDS,
-    EDGES,
-    FILE_IDS,
-    HEARTBEAT_ID,
-    HIGH_LATENCY_ID,
-)
 from .options import HardwareOptions
-from .places import Places
+from .readiness.rule import inhibit
+from .reason import EvidenceOfVehicle
 from .requests.scheduler import Ask, RequestScheduler
-from .rules.inhibits import inhibit
-from .state.applet import is_word
-from .state.high_latency import stated
-from .update import on_frame, status_at
+from .satellite.state import stated
+from .slots import VehicleSlots
+from .subjects import APPLET_ID, ARM_STATUS_ID, COMMAND_IDS, EDGES, FILE_IDS, HEARTBEAT_ID, HIGH_LATENCY_ID
+from .update import on_frame as apply_frame
+from .update import status_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Container, Hashable, Iterator, Sequence
@@ -48,7 +41,7 @@ if TYPE_CHECKING:
     from .derive import Derived
     from .facts import Facts
     from .px4_events import EventTable
-    from .state.vehicle_state import VehicleState
+    from .state import VehicleState
     from .vehicle import ExpectedVehicle, Names, TrackedVehicle
 
 log = logging.getLogger(__name__)
@@ -74,13 +67,13 @@ class MavlinkRobotHW(RobotHW):
         super().__init__()
         self.options = options or HardwareOptions()
         self._asking = RequestScheduler(self.options.watch_outputs, own_component, self.options.request_events)
-        self._places = Places(slots, self.handles, {} if beliefs is None else beliefs, names or {})
-        self._tracked = self._places.tracked
+        self._slots = VehicleSlots(slots, self.handles, {} if beliefs is None else beliefs, names or {})
+        self._tracked = self._slots.tracked
         self._due: DueTimes[TrackedVehicle] = DueTimes()
         """When the status of each vehicle may change. -inf: at once."""
         self.asks = False
         """Whether `due_requests` is called at all."""
-        self.hear_file: Callable[[TrackedVehicle, Any, float], None] | None = None
+        self.on_file: Callable[[TrackedVehicle, Any, float], None] | None = None
         """Called with each message of a vehicle that brings a file or its place."""
         self._event_table: EventTable | None = None
         """The words for the events of each vehicle without its own table."""
@@ -95,7 +88,7 @@ class MavlinkRobotHW(RobotHW):
     @property
     def deadline(self) -> float:
         """When (monotonic seconds) `read` has work. -inf: at once."""
-        return min(self._due.first, self._places.expire_at)
+        return min(self._due.first, self._slots.expire_at)
 
     @property
     def vehicles(self) -> Iterator[TrackedVehicle]:
@@ -134,7 +127,7 @@ class MavlinkRobotHW(RobotHW):
                 speaker.state.event_table = table
         self._touch(tracked, -math.inf)
 
-    def take(self, frame: Values, now: Instant, source: Hashable = None, lag: float = 0.0) -> TrackedVehicle | None:
+    def on_frame(self, frame: Values, now: Instant, source: Hashable = None, lag: float = 0.0) -> TrackedVehicle | None:
         """Process one frame. `source`: where it arrived; None if there is one place only.
 
         `lag`: how late it is by its signature, seconds. Returns the vehicle if the frame is a heartbeat of its
@@ -143,12 +136,10 @@ class MavlinkRobotHW(RobotHW):
         message_id, ids, _, message, _, _ = frame
         if message_id in COMMAND_IDS and message is not None:
             self._overhear(message, ids, now)
-        tracked = self._tracked.get(ids)
+        tracked = self._tracked.get(ids) or self._first_heard(frame, now)
         if tracked is None:
-            tracked = self._first_heard(frame, now)
-            if tracked is None:
-                return None
-        _, speaker, said = on_frame(tracked, frame, source, now, lag, self.options)
+            return None
+        _, speaker, said = apply_frame(tracked, frame, source, now, lag, self.options)
         if speaker is None:
             if message_id == HEARTBEAT_ID:
                 self._touch(tracked, -math.inf)
@@ -157,14 +148,11 @@ class MavlinkRobotHW(RobotHW):
         if said is None or speaker is not tracked.belief.main:
             return None
         if message_id == HEARTBEAT_ID:
-            if not is_autopilot(message, ids[1]):
-                return None
-            tracked.handle.heard_at = said.mono
-            return tracked
+            return _note_heartbeat(tracked, message, said.mono)
         if message_id == HIGH_LATENCY_ID:
             _note_statement(tracked)
         elif message_id in FILE_IDS:
-            self._hear_file(tracked, message, now)
+            self._on_file_message(tracked, message, now)
         elif tracked.requests is not None:
             self._asking.heard(tracked, message, message_id, now.mono)
         return None
@@ -194,7 +182,7 @@ class MavlinkRobotHW(RobotHW):
         """Update the handles to `now`."""
         if self._unheard:
             self._report_unheard(now)
-        if now.mono >= self._places.expire_at and (gone := self._places.expired(now.mono, self.options)):
+        if now.mono >= self._slots.expire_at and (gone := self._slots.expired(now.mono, self.options)):
             self._remove(gone)
         while self._due.first <= now.mono:
             self._update(self._due.first_key(), now)
@@ -247,9 +235,9 @@ class MavlinkRobotHW(RobotHW):
 
         Statuses do not change until the next `read`.
         """
-        self._places.expire_at = -math.inf
+        self._slots.expire_at = -math.inf
         for ids, theirs in other._tracked.items():
-            tracked = None if theirs.state is None else self._places.place(ids, theirs.belief)
+            tracked = None if theirs.state is None else self._slots.place(ids, theirs.belief)
             if tracked is None:
                 continue
             ours = tracked.handle
@@ -276,7 +264,7 @@ class MavlinkRobotHW(RobotHW):
     def _report_unheard(self, now: Instant) -> None:
         """Once: set LINK_STALE for each expected vehicle that sent nothing."""
         self._unheard = False
-        for tracked in self._places.expected:
+        for tracked in self._slots.expected:
             if tracked.state is None:
                 unheard = inhibit("LINK_STALE", None, tracked.handle.detail, now)
                 tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
@@ -301,19 +289,19 @@ class MavlinkRobotHW(RobotHW):
                 if tracked.state.faulty_parts is not before:
                     self._touch(tracked, -math.inf)
 
-    def _hear_file(self, tracked: TrackedVehicle, message: Any, now: Instant) -> None:
+    def _on_file_message(self, tracked: TrackedVehicle, message: Any, now: Instant) -> None:
         """Hand on where a table of events is, or a piece of it."""
         if type(message) is mav.ComponentMetadata and tracked.requests is not None:
             tracked.requests.delivered(METADATA.id)
-        if self.hear_file is not None:
-            self.hear_file(tracked, message, now.mono)
+        if self.on_file is not None:
+            self.on_file(tracked, message, now.mono)
 
     def _discover(self, ids: tuple[int, int], heartbeat: mav.Heartbeat, now: Instant) -> TrackedVehicle | None:
         """The vehicle of an autopilot that sends its first HEARTBEAT; None if no entry of the configuration matches."""
-        gone = self._places.room_for(ids, now.mono, self.options)
+        gone = self._slots.room_for(ids, now.mono, self.options)
         if gone:
             self._remove(gone)
-        tracked = (None if gone is None else self._places.place(ids)) or self._succeed(ids)
+        tracked = (None if gone is None else self._slots.place(ids)) or self._succeed(ids)
         if tracked is None:
             self.ignored += 1
             return None
@@ -328,7 +316,7 @@ class MavlinkRobotHW(RobotHW):
         for tracked in gone:
             if tracked.ids is not None:
                 self._event_tables.pop(tracked.ids, None)
-            self._places.remove(tracked)
+            self._slots.remove(tracked)
             self._due.set(tracked, math.inf)
         self._unheard = self.changed = True
 
@@ -340,7 +328,7 @@ class MavlinkRobotHW(RobotHW):
         """
         if ids[1] != MAV_COMP_ID_AUTOPILOT1:
             return None
-        for tracked in self._places.expected:
+        for tracked in self._slots.expected:
             owner = tracked.ids
             if owner is None or tracked.slot.component is not None or owner[0] != ids[0] or _is_armed(tracked):
                 continue
@@ -348,7 +336,7 @@ class MavlinkRobotHW(RobotHW):
             tracked.forget()
             self._due.set(tracked, math.inf)
             tracked.requests = tracked.parameters = None
-            self._places.give(tracked, ids)
+            self._slots.give(tracked, ids)
             return tracked
         return None
 
@@ -425,12 +413,20 @@ class MavlinkRobotHW(RobotHW):
         ids = tracked.ids or (0, 0)
         if state is LinkState.LOST and before is LinkState.CONNECTED:
             tracked.losses += 1
-            self._places.lost(tracked, self.options)
+            self._slots.lost(tracked, self.options)
             log.warning("lost vehicle %d.%d: nothing for %g s", *ids, tracked.timeout(self.options))
         elif state is LinkState.CONNECTED and before is LinkState.LOST:
             log.info("vehicle %d.%d is back", *ids)
             if tracked.requests is not None:
                 tracked.requests.reconnected(tracked.handle.heard_at or 0.0)
+
+
+def _note_heartbeat(tracked: TrackedVehicle, message: mav.Heartbeat, at: float) -> TrackedVehicle | None:
+    """Note when the autopilot of the vehicle sent its last HEARTBEAT; None if this one is of another sender."""
+    if not is_autopilot(message, tracked.component):
+        return None
+    tracked.handle.heard_at = at
+    return tracked
 
 
 def _note_statement(tracked: TrackedVehicle) -> None:

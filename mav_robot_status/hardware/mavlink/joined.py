@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 from ...interface.status import Inhibit, RobotMode, TriState
 from ..join import Logic, join
-from .rules.inhibits import inhibit
-from .rules.reason import Reason, Source
+from .readiness.rule import inhibit
+from .reason import Reason, claims_words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ...interface.status import Detail
     from .derive import Derived
 
-DIFFER: Final = Reason("several senders use the ids of this vehicle, and differ", Source.CLAIMS)
+DIFFER: Final = Reason("several senders use the ids of this vehicle, and differ", claims_words)
 LOGIC: Final = {
     "e_stopped": Logic.ALL,
     "drives_powered": Logic.ANY,

@@ -38,7 +38,7 @@ Hold = Annotated[float, Within(0.0, 3600.0, "s")]
 Speed = Annotated[float, Within(0.0, 100.0, "m/s")]
 CustomMode = Annotated[int, Within(0, 2**32 - 1)]
 ModeOverrides = Mapping[CustomMode, RobotMode]
-"""A file may write the name of a mode instead of its number, see `autopilots.mode_names`."""
+"""A file may write the name of a mode instead of its number, see `autopilots.mode_numbers`."""
 VehicleKey = Literal["copter", "plane", "rover", "sub", "tracker", "blimp", "px4", "other"]
 Path = Annotated[str | None, Or("none")]
 """A file."""

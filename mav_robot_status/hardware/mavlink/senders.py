@@ -8,13 +8,13 @@ from ...mavlink.definitions import TYPE_NAMES
 from .armed import is_armed
 from .belief.speakers import HOLD, differ
 from .identity import named
-from .state.high_latency import tells_armed
+from .satellite.state import tells_armed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from .belief import Belief, Speaker
-    from .state.vehicle_state import VehicleState
+    from .state import VehicleState
 
 STRANGER: Final = 3.0
 """Seconds after which a speaker that is not proven to be the vehicle is told. A boot is proven sooner."""

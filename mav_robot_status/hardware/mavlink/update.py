@@ -12,21 +12,19 @@ from .armed import is_armed
 from .belief.belief import SAID_ONCE, Heard, Joined
 from .belief.clock import Change
 from .derive import derive
-from .facts import Claimed
-from .handlers import HANDLERS_BY_ID, pass_time
-from .handlers.heartbeat import exchanged, rebooted, starts_anew
-from .handlers.high_latency import follows, high_latency, sends_heartbeats
+from .estop import state as estop
+from .facts import UNDISPUTED, Claimed, Deadline
+from .faults.texts import pass_time
+from .heartbeat.messages import exchanged, rebooted, starts_anew
+from .heartbeat.state import missed
 from .identity import is_autopilot
 from .joined import joined
-from .message_table import HEARTBEAT_ID, HIGH_LATENCY_ID
-from .moment import Moment
+from .motion import state as motion
+from .satellite.messages import follows, high_latency, sends_heartbeats
+from .satellite.state import stated, tells_armed
 from .senders import LATE, stranger
-from .settle import facts_of
-from .settle.table import UNDISPUTED
-from .state import estop, motion
-from .state.heartbeat_history import missed
-from .state.high_latency import stated, tells_armed
-from .state.vehicle_state import VehicleState, begin, timeout_of
+from .state import VehicleState, begin, timeout_of
+from .subjects import HANDLERS_BY_ID, HEARTBEAT_ID, HIGH_LATENCY_ID, facts_of
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -213,11 +211,11 @@ def _settle(speaker: Speaker, state: VehicleState, now: Instant, options: Hardwa
     for moving in (state.motion, state.gps_motion, state.rotation):
         motion.settle(moving, now.mono)
     state.stop = estop.moved(state.stop, state.motion.value, now.mono)
-    moment = Moment(now.mono)
-    facts = facts_of(state, moment, options)
+    deadline = Deadline(now.mono)
+    facts = facts_of(state, deadline, options)
     if facts != speaker.facts:
         speaker.facts = facts
-    return moment.next if _is_connected(speaker) else math.inf
+    return deadline.next if _is_connected(speaker) else math.inf
 
 
 def _is_connected(speaker: Speaker) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...interface import DEFAULT_HANDLE_NAME, Detail, IndustrialRobotStatusHandle, LinkState, RobotStatus, Vehicle
 from .belief import Belief
-from .state.vehicle_state import timeout_of
+from .state import timeout_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from .facts import Facts
     from .options import HardwareOptions
     from .px4_events import EventTable
-    from .requests.lost_events import LostEvents
     from .requests.message_intervals import Requests
     from .requests.parameters import Parameters
-    from .state.vehicle_state import VehicleState
+    from .requests.scheduler import LostEvents
+    from .state import VehicleState
 
     Names = Mapping[tuple[int, int | None], str]
     """The names that people give to vehicles, by system and component id. None: each autopilot of that system."""

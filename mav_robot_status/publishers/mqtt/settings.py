@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-import ssl
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ...errors import UsageError
 from ...interface.options import Option, Options, short
 from ...user_files import read_secret, state_folder
 from .naming import places
+
+if TYPE_CHECKING:
+    import ssl
 
 EXAMPLE: Final = "mqtts://broker.example/robots"
 PASSWORD: Final = "MAV_ROBOT_STATUS_MQTT_PASSWORD"
@@ -124,6 +125,8 @@ def _broker(options: BrokerOptions, environment: Mapping[str, str]) -> Broker:
 
 def default_spool(broker: Broker, environment: Mapping[str, str]) -> str:
     """The default spool: in systemd's StateDirectory, else in the user's state folder (XDG)."""
+    import hashlib
+
     mark = hashlib.sha256(f"{broker.name}/{broker.prefix}".encode()).hexdigest()[:12]
     return os.path.join(state_folder(environment), f"mqtt-{mark}.sqlite")
 
@@ -160,6 +163,8 @@ def _password(file: str | None, environment: Mapping[str, str]) -> str | None:
 
 
 def _tls(options: BrokerOptions) -> ssl.SSLContext:
+    import ssl  # only for a broker with TLS: importing it takes longer than anything else here
+
     ca, cert, key = (os.path.expanduser(file) if file else None for file in (options.ca, options.cert, options.key))
     if key and not cert:
         raise UsageError("mqtt: a key needs its certificate: add --mqtt-cert FILE (cert)")
@@ -181,6 +186,8 @@ def _readable(name: str | None, load: Callable[[], Any]) -> Any:
 
 
 def _why(error: Exception) -> str:
+    import ssl
+
     if isinstance(error, ssl.SSLError):
         return "the PEM certificate and key do not match or cannot be read" + (
             f" ({error.reason})" if error.reason else ""

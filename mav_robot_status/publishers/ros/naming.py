@@ -6,7 +6,6 @@ underscores, and does not start with a digit. One that starts with an underscore
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import re
 from typing import Final
@@ -47,6 +46,8 @@ class Topics:
         return self._topics.pop(handle, None)
 
     def _free(self, handle: str) -> str:
+        import hashlib  # the options of every gateway import this module, and few publish to ROS
+
         part = clean(_without_default(handle))
         taken = set(self._topics.values())
         digest = hashlib.sha256(handle.encode("utf-8", "surrogatepass")).hexdigest()

@@ -20,7 +20,7 @@ from ...docs.documents import ROOT
     [
         ("/x/mav_robot_status/controller.py", "controller.py"),
         ("/x/mav_robot_status/gateway/pace.py", "gateway/pace.py"),
-        ("/x/mav_robot_status/hardware/mavlink/rules/errors.py", "hardware/mavlink/rules"),
+        ("/x/mav_robot_status/hardware/mavlink/faults/rule.py", "hardware/mavlink/faults"),
         ("/y/mav_robot_status/lib/mav_robot_status/links/udp.py", "links"),
         ("/usr/lib/python3.11/json/encoder.py", "standard library and generated code"),
         ("<string>", "standard library and generated code"),
@@ -39,7 +39,7 @@ def test_small_parts_are_one_row_and_the_rows_add_up() -> None:
 
 def test_a_profile_has_the_parts_that_take_part() -> None:
     found = profile(guard.changes())
-    assert {"links", "mavlink", "hardware/mavlink/rules", "controller.py", "publishers"} <= set(found)
+    assert {"links", "mavlink", "hardware/mavlink/faults", "controller.py", "publishers"} <= set(found)
 
 
 def test_the_command_prints_each_event() -> None:

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bench import workload
 from mav_robot_status.gateway.links.routing import MOST_FRAMES
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.mavlink.framing import Parser
 
 HEARTBEAT, ATTITUDE, GLOBAL_POSITION_INT, VFR_HUD = 0, 30, 33, 74

@@ -96,7 +96,7 @@ def test_the_error_that_ends_the_gateway_is_raised(monkeypatch: pytest.MonkeyPat
         raise LinkError("the device has gone")
 
     watched = BackgroundGateway(HERE)
-    monkeypatch.setattr(watched.gateway.hardware.mavlink.vehicles, "take", fail)
+    monkeypatch.setattr(watched.gateway.hardware.mavlink.vehicles, "on_frame", fail)
     watched.__enter__()
     beat(vehicle, watched)
     assert watched.wait(5.0)

@@ -63,7 +63,7 @@ def made(config: Config, port: Port, stdout: TextIO) -> Pipeline:
 
 def take(pipeline: Pipeline, frame: Frame, now: Instant) -> None:
     assert isinstance(pipeline.hw, MavlinkRobotHW)
-    pipeline.hw.take(frame, now)
+    pipeline.hw.on_frame(frame, now)
 
 
 def live(pipeline: Pipeline, start: Instant, seconds: float) -> int:
@@ -356,7 +356,7 @@ def test_a_handle_that_another_configuration_lacks_is_unknown_on_the_outputs_tha
 
     def renewed() -> MavlinkRobotHW:
         hardware = robot_hw(after)
-        hardware.take(heartbeat(armed=True), START)
+        hardware.on_frame(heartbeat(armed=True), START)
         return hardware
 
     pipeline.change(after, renewed, later(START, 0.1))

@@ -14,8 +14,7 @@ from mav_robot_status.gateway.replay import ReplayPipeline, replay, run_through
 from mav_robot_status.hardware.mavlink import update
 from mav_robot_status.hardware.mavlink.derive import derive
 from mav_robot_status.hardware.mavlink.interface import SETTLES
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
-from mav_robot_status.hardware.mavlink.settle import facts_of
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS, facts_of
 from mav_robot_status.links.log import Stamped
 from mav_robot_status.mavlink.definitions import Attitude, GlobalPositionInt, Heartbeat, NamedValueInt, VfrHud
 from mav_robot_status.mavlink.encode import encode

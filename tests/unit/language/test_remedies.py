@@ -8,9 +8,9 @@ import time
 import pytest
 
 from mav_robot_status.hardware.group import NOT_POSSIBLE
-from mav_robot_status.hardware.mavlink.causes import CAUSES
+from mav_robot_status.hardware.mavlink.faults.causes import CAUSES
 from mav_robot_status.hardware.mavlink.px4_events.ids import HEALTH_COMPONENTS
-from mav_robot_status.hardware.mavlink.rules.inhibits import INHIBITS
+from mav_robot_status.hardware.mavlink.readiness.rule import INHIBITS
 from mav_robot_status.hardware.simple_message.status import status_of, values_of
 from mav_robot_status.hardware.ur.status import NOT_RUNNING, STOPS
 from mav_robot_status.interface import Detail

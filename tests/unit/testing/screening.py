@@ -7,8 +7,8 @@ interface go back to the model. Every status is checked against the invariants.
 from __future__ import annotations
 
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
+from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
 from mav_robot_status.hardware.mavlink.vehicle import TrackedVehicle
 from mav_robot_status.interface import Detail, RobotMode, RobotStatus, TriState
 from mav_robot_status.mavlink.encode import encode
@@ -83,7 +83,7 @@ class Screening:
 
     def _receive(self, data: bytes) -> None:
         for frame in self._parser.feed(data):
-            self.hw.take(frame, self.clock.now())
+            self.hw.on_frame(frame, self.clock.now())
 
     def _read(self) -> None:
         now = self.clock.now()

@@ -14,7 +14,7 @@ from typing import Final
 
 from ....interface.status import RobotMode
 from ....mavlink import enumerations as mavlink
-from .. import causes
+from ..faults import causes
 from ..identity import Family
 from . import sensor_weights, wanted
 from .modes import ModeTable, by_table

@@ -31,7 +31,7 @@ class Uninit(Enum):
 
 
 class EmergencyStop(Enum):
-    """The indications of an emergency stop. `rules/e_stopped.py` has one function for each."""
+    """The indications of an emergency stop. `estop/rule.py` has one function for each."""
 
     STATE = "MAV_STATE_FLIGHT_TERMINATION shows every stop"
     DEDUCED = "texts, pre-arm checks, the safety switch and the motor outputs together"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from ....interface.status import RobotMode
 from ....mavlink import enumerations as mavlink
-from .. import causes
+from ..faults import causes
 from . import sensor_weights, wanted
 from .modes import FlightMode, ModeHints, other_name
 from .profile import (

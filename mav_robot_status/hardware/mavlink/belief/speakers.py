@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ....mavlink.enumerations import MAV_AUTOPILOT_INVALID
 from ..armed import is_armed, may_move
-from ..state.high_latency import is_statement, tells_armed
+from ..satellite.state import is_statement, tells_armed
 from .clock import JUMP, NEAR, Clock, turned
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from struct import Struct
 from typing import TYPE_CHECKING, Final
 
-from .. import causes
+from ..faults import causes
 
 if TYPE_CHECKING:
     from ....mavlink.definitions import Event

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
+from itertools import takewhile
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ....interface import LinkState
+from ....interface.status import TriState
 from ....mavlink import definitions as mav
 from ....mavlink import enumerations as mavlink
 from ....mavlink.decode import text
-from ....mavlink.definitions import CommandAck, MessageInterval, ParamValue, Statustext
-from ....mavlink.enumerations import MAV_STATE_BOOT, MAV_STATE_CALIBRATING, MAV_STATE_UNINIT
+from ....mavlink.definitions import CommandAck, MessageInterval, ParamValue, RequestEvent, Statustext
+from ....mavlink.enumerations import MAV_CMD_RUN_PREARM_CHECKS, MAV_STATE_BOOT, MAV_STATE_CALIBRATING, MAV_STATE_UNINIT
 from ..autopilots.profile import Uninit
 from ..autopilots.wanted import METADATA, OUTPUT_WATCH, Once
-from . import prearm_checks
-from .lost_events import LostEvents
 from .message_intervals import Requests, wanted_of
 from .parameters import Parameters
 
@@ -141,7 +141,7 @@ class RequestScheduler:
             message = self._lost_events(ids, tracked)
         if message is None and not tracked.requests.checks_asked and _may_be_asked(tracked, now):
             tracked.requests.checks_asked = True
-            message = prearm_checks.command(ids)
+            message = command(ids)
         self.next_due = min(self.next_due, tracked.requests.next_due())
         return message
 
@@ -170,10 +170,56 @@ def is_booting(tracked: TrackedVehicle) -> bool:
 
 def _may_be_asked(tracked: TrackedVehicle, now: float) -> bool:
     """Whether the pre-arm checks of a vehicle should run now."""
-    return prearm_checks.is_wanted(tracked, now) and _has_stayed(tracked) and not is_booting(tracked)
+    return is_wanted(tracked, now) and _has_stayed(tracked) and not is_booting(tracked)
 
 
 def _has_stayed(tracked: TrackedVehicle) -> bool:
     """Whether it sent more than one HEARTBEAT: nothing is asked of an id that was heard once."""
     heartbeats = None if tracked.state is None else tracked.state.heartbeats
     return heartbeats is not None and heartbeats.runs[-1].last > heartbeats.since.mono
+
+
+LISTEN: Final = 3.0
+"""Seconds from the first heartbeat in which a PX4 may report by itself."""
+
+
+def is_wanted(tracked: TrackedVehicle, now: float) -> bool:
+    """Whether the vehicle is disarmed beyond doubt, can be asked, and has not said whether, or why, its checks fail."""
+    state, facts = tracked.state, tracked.facts
+    if state is None or not facts or not state.profile.requests.prearm_checks:
+        return False
+    if state.heartbeats.armed or tracked.handle.status.drives_powered is not TriState.FALSE:
+        return False
+    if state.profile.texts.sends_events:
+        return not state.arming.chunks and now >= state.heartbeats.since.mono + LISTEN
+    return facts.fresh.sys_status and facts.sys_status.ready is TriState.FALSE
+
+
+def command(ids: tuple[int, int]) -> mav.CommandLong:
+    """The command for the autopilot with these ids."""
+    return mav.CommandLong(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, MAV_CMD_RUN_PREARM_CHECKS, *ids, confirmation=0)
+
+
+class LostEvents:
+    """The requests to one autopilot for its lost events."""
+
+    def __init__(self, system: int, component: int) -> None:
+        self._ids = (system, component)
+        self._asked: frozenset[int] = frozenset()
+        """The sequence numbers that were asked for and are still missing."""
+
+    def due(self, missing: tuple[int, ...]) -> RequestEvent | None:
+        """The next request, for the first run of consecutive numbers that were not asked for; None if there is none.
+
+        `missing` are the sequence numbers that have not arrived, the oldest first.
+        """
+        if not missing:
+            self._asked = frozenset()
+            return None
+        self._asked &= frozenset(missing)
+        new = [number for number in missing if number not in self._asked]
+        if not new:
+            return None
+        run = [number for _, number in takewhile(lambda pair: (new[0] + pair[0]) & 0xFFFF == pair[1], enumerate(new))]
+        self._asked |= frozenset(run)
+        return RequestEvent(run[0], run[-1], *self._ids)

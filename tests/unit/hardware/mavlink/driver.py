@@ -11,12 +11,11 @@ from typing import Any
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.hardware.mavlink.derive import Derived, derive
+from mav_robot_status.hardware.mavlink.facts import Deadline
 from mav_robot_status.hardware.mavlink.interface import SETTLES, MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import EDGES
-from mav_robot_status.hardware.mavlink.moment import Moment
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.settle import facts_of
-from mav_robot_status.hardware.mavlink.state.vehicle_state import VehicleState
+from mav_robot_status.hardware.mavlink.state import VehicleState
+from mav_robot_status.hardware.mavlink.subjects import EDGES, facts_of
 from mav_robot_status.hardware.mavlink.update import status_at
 from mav_robot_status.hardware.mavlink.vehicle import ExpectedVehicle, TrackedVehicle
 from mav_robot_status.interface import Detail, LinkState, RobotStatus, TriState
@@ -89,7 +88,7 @@ def check_invariants(status: RobotStatus, detail: Detail, options: HardwareOptio
 
 def derived(state: VehicleState, before: Detail, now: Instant, options: HardwareOptions) -> Derived:
     """The status of vehicle 1.1 with this state at `now`."""
-    return derive(facts_of(state, Moment(now.mono), options), (1, 1), before, now, options)
+    return derive(facts_of(state, Deadline(now.mono), options), (1, 1), before, now, options)
 
 
 def check_present(tracked: TrackedVehicle, now: Instant, options: HardwareOptions) -> None:
@@ -200,7 +199,7 @@ class Flight:
         return self.look()
 
     def _take(self, message: Any, ids: Ids) -> None:
-        self.hw.take(frame_of(message, ids, self._numbers.next(ids)), self.clock.now())
+        self.hw.on_frame(frame_of(message, ids, self._numbers.next(ids)), self.clock.now())
 
     def lose(self, frames: int = 1) -> Flight:
         """Send this many frames that do not arrive."""

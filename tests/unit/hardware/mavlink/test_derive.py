@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.rules.inhibits import INHIBITS
+from mav_robot_status.hardware.mavlink.readiness.rule import INHIBITS
 from mav_robot_status.interface import STATES, Detail, RobotMode, TriState
 
 from .driver import (

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mav_robot_status.hardware.mavlink.moment import Moment
+from mav_robot_status.hardware.mavlink.facts import Deadline
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.settle import facts_of
+from mav_robot_status.hardware.mavlink.subjects import facts_of
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink import definitions as mav
 
@@ -42,7 +42,7 @@ def test_the_next_change_is_the_earliest_possible_change() -> None:
     state, now = flight.vehicle.state, flight.clock.now().mono
     assert state is not None
     for timeout in (3.5, 0.5):
-        moment = Moment(now)
+        moment = Deadline(now)
         facts_of(state, moment, HardwareOptions(heartbeat_timeout=timeout))
         assert now + timeout < moment.next < now + timeout + 1e-6
 

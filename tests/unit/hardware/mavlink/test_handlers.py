@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.state.vehicle_state import VehicleState
+from mav_robot_status.hardware.mavlink.state import VehicleState
 from mav_robot_status.interface import RobotMode, TriState
 from mav_robot_status.mavlink import definitions as mav
 

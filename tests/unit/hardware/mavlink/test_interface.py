@@ -8,7 +8,7 @@ import pytest
 
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.places import MOST_PASSING, MOST_VEHICLES
+from mav_robot_status.hardware.mavlink.slots import MOST_PASSING, MOST_VEHICLES
 from mav_robot_status.hardware.mavlink.vehicle import ESTABLISHED, ExpectedVehicle
 from mav_robot_status.interface import LinkState, RobotStatus, TriState, Vehicle
 from mav_robot_status.mavlink import definitions as mav
@@ -25,7 +25,7 @@ NAME = "industrial_robot_status_handle"
 def hear(hw: MavlinkRobotHW, *ids: tuple[int, int]) -> None:
     clock = ManualClock()
     for one in ids:
-        hw.take(frame_of(BEAT, one), clock.now())
+        hw.on_frame(frame_of(BEAT, one), clock.now())
     hw.read(clock.now())
 
 
@@ -118,10 +118,10 @@ def test_the_number_of_vehicles_is_bounded() -> None:
 def test_only_autopilot_heartbeats_are_returned_to_the_caller() -> None:
     flight = copter()
     now = flight.clock.now()
-    assert flight.hw.take(frame_of(BEAT), now) is flight.vehicle
-    assert flight.hw.take(frame_of(flight.sys_status()), now) is None
-    assert flight.hw.take(frame_of(BEAT._replace(type=6, autopilot=8)), now) is None
-    assert flight.hw.take(frame_of(BEAT._replace(type=6, autopilot=8), (255, 190)), now) is None
+    assert flight.hw.on_frame(frame_of(BEAT), now) is flight.vehicle
+    assert flight.hw.on_frame(frame_of(flight.sys_status()), now) is None
+    assert flight.hw.on_frame(frame_of(BEAT._replace(type=6, autopilot=8)), now) is None
+    assert flight.hw.on_frame(frame_of(BEAT._replace(type=6, autopilot=8), (255, 190)), now) is None
 
 
 def test_nothing_is_due_before_the_first_message_and_after_the_loss() -> None:
@@ -237,7 +237,7 @@ def test_a_vehicle_that_is_no_longer_expected_is_not_taken_over() -> None:
 def test_a_mavlink_1_frame_is_handled_like_a_mavlink_2_frame() -> None:
     flight = px4(streams=False)
     (frame,) = Parser({0}).feed(encode(BEAT, system=1, component=1, sequence=0, version=1))
-    flight.hw.take(frame, flight.clock.now())
+    flight.hw.on_frame(frame, flight.clock.now())
     flight.look()
     assert flight.status.drives_powered is TriState.TRUE
 
@@ -246,7 +246,7 @@ def beats(hw: MavlinkRobotHW, clock: ManualClock, seconds: float, *ids: tuple[in
     """Heartbeats of these vehicles once a second; at the end a `read`."""
     for _ in range(round(seconds)):
         for one in ids:
-            hw.take(frame_of(BEAT, one), clock.now())
+            hw.on_frame(frame_of(BEAT, one), clock.now())
         hw.read(clock.now())
         clock.advance(1.0)
     hw.read(clock.now())

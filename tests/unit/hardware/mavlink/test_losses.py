@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mav_robot_status.hardware.mavlink.causes import CRASH, EMERGENCY, REBOOT_WHILE_ARMED
+from mav_robot_status.hardware.mavlink.faults.causes import CRASH, EMERGENCY, REBOOT_WHILE_ARMED
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink import definitions as mav
 from mav_robot_status.mavlink.enumerations import MAV_STATE_EMERGENCY, MAV_TYPE_FIXED_WING

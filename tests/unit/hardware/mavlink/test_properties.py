@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import string
 from collections.abc import Callable
+from dataclasses import fields
 from functools import partial
 from typing import Any
 
@@ -12,16 +13,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mav_robot_status.clock import Instant, later
-from mav_robot_status.hardware.mavlink import causes
-from mav_robot_status.hardware.mavlink.handlers import HANDLERS
-from mav_robot_status.hardware.mavlink.handlers.modes import MOST_MODES
+from mav_robot_status.hardware.mavlink.faults import causes, text_assembly
+from mav_robot_status.hardware.mavlink.heartbeat.messages import MOST_MODES
+from mav_robot_status.hardware.mavlink.heartbeat.state import RUNS
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
-from mav_robot_status.hardware.mavlink.message_table import WANTED_IDS
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.state import text_assembly
-from mav_robot_status.hardware.mavlink.state.heartbeat_history import RUNS
-from mav_robot_status.hardware.mavlink.state.latest_messages import REMEMBERED
-from mav_robot_status.hardware.mavlink.state.vehicle_state import VehicleState
+from mav_robot_status.hardware.mavlink.state import REMEMBERED, VehicleState
+from mav_robot_status.hardware.mavlink.subjects import HANDLERS, WANTED_IDS
 from mav_robot_status.hardware.mavlink.vehicle import ExpectedVehicle, TrackedVehicle
 from mav_robot_status.interface import Detail, IndustrialRobotStatusHandle, RobotMode, RobotStatus, TriState
 from mav_robot_status.mavlink import definitions as mav
@@ -164,7 +162,7 @@ class Walk:
 
     def take(self, message: Any, seconds: float = 0.0) -> RobotStatus:
         self.now = later(self.now, seconds)
-        self.hw.take(frame_of(message, sequence=self._numbers.next(None)), self.now)
+        self.hw.on_frame(frame_of(message, sequence=self._numbers.next(None)), self.now)
         self.hw.read(self.now)
         return self.status
 
@@ -309,7 +307,10 @@ def check_bounds(state: VehicleState) -> None:
     assert set(state.watch.functions) <= set(range(1, 33))
     assert set(state.watch.stop) <= set(range(1, 17))
     assert set(state.faults) <= set(range(64))
-    assert all(heard is None or len(heard.times) <= REMEMBERED for heard in state.latest)
+    assert all(
+        heard is None or len(heard.times) <= REMEMBERED
+        for heard in (getattr(state.latest, kind.name) for kind in fields(state.latest))
+    )
 
 
 def test_memory_stays_bounded_under_a_flood_of_modes_texts_chunks_and_parameters() -> None:
@@ -333,7 +334,7 @@ def test_any_payload_is_accepted(message_id: int, payload: bytes, version: int) 
         return
     data = enclose(message_id, payload, system=1, component=1, sequence=0, version=version)
     (frame,) = Parser(WANTED_IDS).feed(data)
-    flight.hw.take(frame, flight.clock.now())
+    flight.hw.on_frame(frame, flight.clock.now())
     flight.hw.read(flight.clock.now())
     check_invariants(flight.status, flight.detail, flight.hw.options)
 

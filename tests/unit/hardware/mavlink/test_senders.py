@@ -45,7 +45,7 @@ class Ears:
             number = self._next.setdefault(count, first)
             self._next[count] = number + 1
             (frame,) = Parser(None).feed(encode(message, system=1, component=1, sequence=number % 256))
-            self.hw.take(frame, self.now, channel)
+            self.hw.on_frame(frame, self.now, channel)
         self.hw.read(self.now)
 
     @property

@@ -9,8 +9,7 @@ from typing import Any, Final
 
 import pytest
 
-from mav_robot_status.hardware.mavlink.handlers import HANDLERS
-from mav_robot_status.hardware.mavlink.message_table import EDGES, WANTED_IDS
+from mav_robot_status.hardware.mavlink.subjects import EDGES, HANDLERS, WANTED_IDS
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink import definitions as mav
 
@@ -240,7 +239,7 @@ def another_sender_disagrees_for_some_time() -> None:
     for number in range(8):
         flight.wait(1)
         armed = flight.heartbeat()._replace(base_mode=209)
-        flight.hw.take(frame_of(armed, sequence=100 + number), flight.clock.now(), "another channel")
+        flight.hw.on_frame(frame_of(armed, sequence=100 + number), flight.clock.now(), "another channel")
     assert flight.wait(0.5)[-1].error_code == 9002
     flight.wait(20)
     assert flight.codes == []

@@ -38,7 +38,7 @@ class Air:
         """One message. Returns whether it is a heartbeat of the vehicle, and its news."""
         first = self._first.setdefault(channel, 60 * len(self._first))
         number = (self._numbers.next(channel) + first if sequence is None else sequence) & 255
-        taken = self.hw.take(frame_of(message, ids, number), self.clock.now(), channel)
+        taken = self.hw.on_frame(frame_of(message, ids, number), self.clock.now(), channel)
         self._read()
         return taken is not None
 

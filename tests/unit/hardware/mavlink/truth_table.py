@@ -7,10 +7,13 @@ import pathlib
 from typing import Any
 
 from mav_robot_status.clock import Instant
-from mav_robot_status.hardware.mavlink.handlers import hear
+from mav_robot_status.hardware.mavlink.estop import outputs
+from mav_robot_status.hardware.mavlink.estop import state as estop
+from mav_robot_status.hardware.mavlink.faults import latches, sensors
+from mav_robot_status.hardware.mavlink.motion import state as motion
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
-from mav_robot_status.hardware.mavlink.state import estop, latches, motion, outputs, sensors
-from mav_robot_status.hardware.mavlink.state.vehicle_state import VehicleState, begin
+from mav_robot_status.hardware.mavlink.state import VehicleState, begin
+from mav_robot_status.hardware.mavlink.subjects import HANDLERS
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink import definitions as mav
 
@@ -20,6 +23,10 @@ CASES: list[dict[str, Any]] = json.loads(
 NOW = Instant(1000.0, 1_800_000_000_000_000)
 UPTIME_MS = 900_000
 OPTIONS = HardwareOptions()
+
+
+def hear(state: VehicleState, message: Any, now: Instant) -> None:
+    HANDLERS[type(message)](state, message, now, OPTIONS)
 
 
 def state_of(inputs: dict[str, Any]) -> tuple[VehicleState, Instant]:
@@ -33,22 +40,22 @@ def state_of(inputs: dict[str, Any]) -> tuple[VehicleState, Instant]:
         words = [*inputs["ss"], 0, 0, 0][:6]
         errors = inputs.get("ierr", 0)
         status = mav.SysStatus._make((*words[:3], errors & 0xFFFF, errors >> 16, *words[3:]))
-        hear(state, status, before, OPTIONS)
+        hear(state, status, before)
         state.faults = {bit: f._replace(messages=sensors.DEBOUNCE_MESSAGES) for bit, f in state.faults.items()}
         ready = estop.READY_MESSAGES if _would_be_ready(state, status) else 0
         state.stop = state.stop._replace(ready=ready)
     if "landed" in inputs:
-        hear(state, mav.ExtendedSysState(0, inputs["landed"]), before, OPTIONS)
+        hear(state, mav.ExtendedSysState(0, inputs["landed"]), before)
     if "rate" in inputs:
-        hear(state, mav.Attitude(UPTIME_MS, 0, 0, inputs["rate"]), before, OPTIONS)
+        hear(state, mav.Attitude(UPTIME_MS, 0, 0, inputs["rate"]), before)
     if "vel" in inputs:
-        hear(state, mav.LocalPositionNed(UPTIME_MS, *inputs["vel"]), before, OPTIONS)
+        hear(state, mav.LocalPositionNed(UPTIME_MS, *inputs["vel"]), before)
         sustained = NOW.mono - motion.SUSTAIN_OFF
         measured = state.motion
         measured.fast_since = None if measured.fast_since is None else sustained
         measured.slow_since = None if measured.slow_since is None else sustained
     if "std" in inputs:
-        hear(state, mav.CurrentMode(custom_mode, custom_mode, inputs["std"]), before, OPTIONS)
+        hear(state, mav.CurrentMode(custom_mode, custom_mode, inputs["std"]), before)
     for code in inputs.get("texts", ()):
         state.latches = latches.announce(state.latches, code, "as announced", before)
     if "estop" in inputs:

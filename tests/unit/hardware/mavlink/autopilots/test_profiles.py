@@ -18,7 +18,7 @@ from mav_robot_status.hardware.mavlink.autopilots import (
 )
 from mav_robot_status.hardware.mavlink.autopilots import profile as parts
 from mav_robot_status.hardware.mavlink.autopilots.texts import classify
-from mav_robot_status.hardware.mavlink.causes import CAUSES
+from mav_robot_status.hardware.mavlink.faults.causes import CAUSES
 from mav_robot_status.hardware.mavlink.identity import Family
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
 from mav_robot_status.interface import Detail

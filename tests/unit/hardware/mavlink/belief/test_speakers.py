@@ -17,7 +17,7 @@ from mav_robot_status.hardware.mavlink.belief.speakers import (
     has_booted,
     is_same_boot,
 )
-from mav_robot_status.hardware.mavlink.state.high_latency import stated
+from mav_robot_status.hardware.mavlink.satellite.state import stated
 from mav_robot_status.mavlink.definitions import Heartbeat, HighLatency2
 
 DISARMED, ARMED, TERMINATED = Heartbeat(0, 2, 3, 81, 3, 3), Heartbeat(0, 2, 3, 209, 4, 3), Heartbeat(0, 2, 3, 209, 8, 3)

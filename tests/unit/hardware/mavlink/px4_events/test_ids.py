@@ -6,7 +6,7 @@ from struct import pack
 
 import pytest
 
-from mav_robot_status.hardware.mavlink import causes
+from mav_robot_status.hardware.mavlink.faults import causes
 from mav_robot_status.hardware.mavlink.px4_events.ids import (
     ARMING_SUMMARY,
     HEALTH_COMPONENTS,

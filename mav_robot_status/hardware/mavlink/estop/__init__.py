@@ -1,0 +1,1 @@
+"""Emergency stops: what says that one is engaged or released."""

@@ -1,0 +1,1 @@
+"""Causes of an error: SYS_STATUS, texts and parts."""

@@ -1,0 +1,1 @@
+"""HEARTBEAT: armed, the flight mode, and what the vehicle is."""

@@ -1,0 +1,1 @@
+"""Speed, rotation and the land detector: whether the vehicle moves."""

@@ -1,0 +1,1 @@
+"""Why motion is not possible, and why the vehicle cannot be armed."""

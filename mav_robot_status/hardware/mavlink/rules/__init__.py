@@ -1,1 +1,0 @@
-"""One module for each field of a RobotStatus, or for a few related ones: pure functions with evidence."""

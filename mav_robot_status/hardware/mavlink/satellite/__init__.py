@@ -1,0 +1,1 @@
+"""HIGH_LATENCY2: a vehicle behind a satellite."""

@@ -1,1 +1,0 @@
-"""The state of one vehicle: values and records that messages change."""

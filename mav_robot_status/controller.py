@@ -70,6 +70,7 @@ class IndustrialRobotStatusController:
 
         Raises ConfigError for a parameter of the wrong type, UnknownHandleError if no handle has that name.
         """
+        # ORIGINAL: a rate of a wrong type is the default. Here it is an error: a typing mistake must not be a rate.
         rate = parameters.get("publish_rate")
         if rate is None:
             log.info("'publish_rate' not set, using default: %g Hz", DEFAULT_PUBLISH_RATE)
@@ -85,6 +86,8 @@ class IndustrialRobotStatusController:
         if not isinstance(on_change, bool):
             raise ConfigError(f"publish_on_change: must be true or false, not {on_change!r}")
         self.publish_on_change = on_change
+        # ORIGINAL: returns false for an unknown handle. Here it raises, because nobody reads a return value.
+        # ORIGINAL: copies the handle. Here it is the registered one, which may be removed.
         self.handle = hw.get(IndustrialRobotStatusInterface).get_handle(name)
         self._publishers = publishers
 

@@ -148,7 +148,7 @@ def number(kind: Callable[[str], N], low: float, high: float, what: str) -> Call
     return read
 
 
-rate: Final = number(float, 0, 1000, "a rate; write a number of Hz up to 1000, 0 for none")
+rate: Final = number(float, -sys.float_info.max, 1000, "a rate; write a number of Hz up to 1000, 0 for none")
 seconds: Final = number(float, 1e-9, 3600, "a duration; write a number of seconds up to 3600")
 gap: Final = number(float, 0, 86400, "a duration; write a number of seconds up to 86400")
 system: Final = number(int, 1, 255, "a system id; write a number from 1 to 255")

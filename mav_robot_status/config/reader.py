@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, get_type_hints
@@ -24,7 +25,7 @@ MAVLINK: Final = "mavlink"
 """The type of the MAVLink hardware interface in a list."""
 PARAMETERS: Final[dict[str, Any]] = {
     "handle_name": str,
-    "publish_rate": Annotated[float, Within(0.0, 1000.0, "Hz")],
+    "publish_rate": Annotated[float, Within(-math.inf, 1000.0, "Hz")],  # 0 or less: nothing periodically
     "publish_on_change": bool,
     "publishers": tuple[PublisherConfig, ...],
 }

@@ -110,7 +110,8 @@ def _number(kind: type[int | float], node: Node, within: Within | None = None, w
     if type(value) in (int, kind) and math.isfinite(value) and (not within or within.low <= value <= within.high):
         return kind(value)
     what = "a whole number" if kind is int else "a number"
-    bounds = f" from {within.low:.10g} to {within.high:.10g} {within.unit}".rstrip() if within else ""
+    lowest = f"from {within.low:.10g} to" if within and within.low > -math.inf else "of at most"
+    bounds = f" {lowest} {within.high:.10g} {within.unit}".rstrip() if within else ""
     raise must_be(what + bounds + (f" or '{word.word}'" if word else ""), node)
 
 

@@ -16,7 +16,6 @@ from ..clock import Instant
 from ..controller import IndustrialRobotStatusController
 from ..due_times import DueTimes
 from ..interface import (
-    Detail,
     Inhibit,
     InterfaceManager,
     LinkState,
@@ -139,8 +138,8 @@ class Pipeline:
         detail = handle.detail
         if detail.link is not LinkState.NEVER_SEEN:
             why = Inhibit("LINK_STALE", "the configuration no longer publishes it here", now.unix_us)
-            detail = Detail(detail.system, detail.component, (), (why,), link=LinkState.NEVER_SEEN)
-            publisher.publish(RobotStatusMsg(handle.name, now.unix_us, RobotStatus(), detail, None))
+            gone = detail.lost(why, LinkState.NEVER_SEEN)
+            publisher.publish(RobotStatusMsg(handle.name, now.unix_us, RobotStatus(), gone, None))
             publisher.service(now)
         forget: Callable[[str], None] = getattr(publisher, "forget", _keep)
         forget(handle.name)

@@ -8,7 +8,16 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from ..clock import Instant
-from ..interface import Detail, HardwareInterface, IndustrialRobotStatusHandle, IoSource, LinkState, RobotHW
+from ..interface import (
+    GROUP,
+    Detail,
+    HardwareInterface,
+    IndustrialRobotStatusHandle,
+    IoSource,
+    LinkState,
+    RobotHW,
+    Vehicle,
+)
 from .group import Group, combine, last_heard, member_of
 
 log = logging.getLogger(__name__)
@@ -29,7 +38,7 @@ class CombinedRobotHW(RobotHW):
         self._outdated = True
         """Whether the groups have to be combined again."""
         for _, handle in self._groups:
-            handle.detail = Detail(link=LinkState.NEVER_SEEN)
+            handle.detail = Detail(vehicle=Vehicle(type=GROUP), link=LinkState.NEVER_SEEN)
             self.handles.register_handle(handle)
         self._collect()
 

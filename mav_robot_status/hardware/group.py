@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 from ..interface import (
+    GROUP,
     STATES,
     Detail,
     ErrorCause,
@@ -17,6 +18,7 @@ from ..interface import (
     IndustrialRobotStatusHandle,
     Inhibit,
     LinkState,
+    NotReady,
     RobotMode,
     RobotStatus,
     TriState,
@@ -24,8 +26,8 @@ from ..interface import (
 )
 from .join import Logic, join
 
-GROUP: Final = "GROUP"
-"""`vehicle.type` of a group."""
+MOTION_UNKNOWN: Final = "MOTION_UNKNOWN"
+"""Why a member is not ready that does not say whether it can move."""
 NOT_POSSIBLE: Final = "MOTION_NOT_POSSIBLE"
 """The inhibit for a member that gives no reason of its own."""
 
@@ -120,10 +122,27 @@ def combine(group: Group, members: Sequence[Member], before: Detail, unix_us: in
         vehicle=Vehicle(type=GROUP),
         link=_link(members),
         members=tuple(member.name for member in members),
+        not_ready=tuple(NotReady(m.name, why) for m in members if (why := _not_ready(m)) is not None),
     )
     if detail.system is not None:
         detail = detail._replace(component=group.component)
     return Combined(status, detail, evidence)
+
+
+def _not_ready(member: Member) -> str | None:
+    """Why a member cannot work now; None if it can."""
+    status, detail = member.status, member.detail
+    if detail.link is not LinkState.CONNECTED:
+        return "LINK_STALE"
+    if status.e_stopped is TriState.TRUE:
+        return "E_STOPPED"
+    if status.in_error is TriState.TRUE:
+        return detail.errors[0].name if detail.errors else f"ERROR_{status.error_code}"
+    if status.motion_possible is TriState.TRUE:
+        return None
+    if detail.inhibits:
+        return detail.inhibits[0].name
+    return NOT_POSSIBLE if status.motion_possible is TriState.FALSE else MOTION_UNKNOWN
 
 
 def _value(member: Member, field: str) -> TriState:

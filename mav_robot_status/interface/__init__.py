@@ -9,11 +9,13 @@ from .options import Option, Options
 from .publisher import Audience, MavlinkPort, Publisher, PublisherContext
 from .registry import IndustrialRobotStatusInterface, InterfaceManager
 from .status import (
+    GROUP,
     Detail,
     ErrorCause,
     Evidence,
     Inhibit,
     LinkState,
+    NotReady,
     RobotStatusMsg,
     Vehicle,
 )
@@ -22,6 +24,7 @@ from .validation import validate
 __all__ = [
     "DEFAULT_HANDLE_NAME",
     "FIELDS",
+    "GROUP",
     "STATES",
     "TRI_STATES",
     "Audience",
@@ -42,6 +45,7 @@ __all__ = [
     "LinkState",
     "MavlinkPort",
     "Metrics",
+    "NotReady",
     "Option",
     "Options",
     "Publisher",

@@ -11,17 +11,16 @@ from .handle import IndustrialRobotStatusHandle
 def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> JsonObject:
     """The status in a handle with its evidence. Ages are in seconds at `now`; UNKNOWN is None.
 
-    `members` is that of a JSON line: only a group has it.
+    `members`, `ready` and `not_ready` are those of a JSON line: only a group has them.
     """
     detail = handle.detail
-    group = {"members": list(detail.members)} if detail.members else {}
     return {
         "stamp": rfc3339(now.unix_us),
         "handle": handle.name,
         "system": detail.system,
         "component": detail.component,
         "vehicle": detail.vehicle.members(),
-        **group,
+        **detail.group_members(),
         "link": {
             "state": detail.link.value,
             "heartbeat_age": None if handle.heard_at is None else round(now.mono - handle.heard_at, 3),

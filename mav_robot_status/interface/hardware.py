@@ -103,6 +103,8 @@ class RobotHW(InterfaceManager):
 
     stops_cut_power = True
     """Whether an emergency stop removes the power at once. Then a robot that is stopped and powered is a fault."""
+    motion_needs_power = True
+    """Whether the robot cannot move while its drives have no power. False: a motion command may switch them on."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -10,17 +10,23 @@ from ..json_object import JsonObject
 from .fields import RobotMode, RobotStatus, TriState
 
 __all__ = [
+    "GROUP",
     "Detail",
     "ErrorCause",
     "Evidence",
     "Inhibit",
     "LinkState",
+    "NotReady",
     "RobotMode",
     "RobotStatus",
     "RobotStatusMsg",
     "TriState",
     "Vehicle",
 ]
+
+
+GROUP: Final = "GROUP"
+"""`vehicle.type` of a group."""
 
 
 class LinkState(str, Enum):
@@ -71,6 +77,14 @@ def _reason(of: ErrorCause | Inhibit) -> dict[str, str | int | None]:
     """What both have in JSON. `handle` is absent while it is None."""
     said: dict[str, str | int | None] = {"name": of.name, "text": of.text, "since": rfc3339(of.since_us)}
     return said if of.handle is None else {**said, "handle": of.handle}
+
+
+class NotReady(NamedTuple):
+    """A member of a group that cannot work now, and why."""
+
+    handle: str
+    why: str
+    """LINK_STALE, E_STOPPED, the name of an error or inhibit, or MOTION_UNKNOWN."""
 
 
 class Vehicle(NamedTuple):
@@ -132,6 +146,32 @@ class Detail(NamedTuple):
     link: LinkState = LinkState.CONNECTED
     members: tuple[str, ...] = ()
     """The handles of a group, see `hardware.group`. Empty for a single robot."""
+    not_ready: tuple[NotReady, ...] = ()
+    """The members of a group that cannot work now."""
+
+    @property
+    def ready(self) -> bool | None:
+        """Whether all members of a group can work now; None for a single robot."""
+        if self.vehicle.type != GROUP and not self.members:
+            return None
+        return bool(self.members) and not self.not_ready
+
+    def group_members(self) -> JsonObject:
+        """The members in JSON that only a group has; empty for a single robot."""
+        if self.ready is None:
+            return {}
+        not_ready = [one._asdict() for one in self.not_ready]
+        return {"members": list(self.members), "ready": self.ready, "not_ready": not_ready}
+
+    def lost(self, why: Inhibit, link: LinkState = LinkState.LOST) -> Detail:
+        """The same robot, of which nothing is known any more."""
+        return self._replace(
+            errors=(),
+            inhibits=(why,),
+            vehicle=self.vehicle._replace(flight_mode=None, custom_mode=None, state=None),
+            link=link,
+            not_ready=tuple(NotReady(member, why.name) for member in self.members),
+        )
 
 
 class RobotStatusMsg(NamedTuple):

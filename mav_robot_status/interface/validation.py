@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from .fields import FIELDS, STATES, Kind, RobotMode, RobotStatus, TriState
-from .status import Detail, ErrorCause, Inhibit, LinkState, Vehicle
+from .status import Detail, ErrorCause, Inhibit, LinkState, NotReady, Vehicle
 
 CODES: Final = range(-(2**31), 2**31)
 """ROBOT_STATUS and industrial_msgs carry a code as int32."""
@@ -15,15 +15,26 @@ IDS: Final = range(256)
 TRUE, FALSE = TriState.TRUE, TriState.FALSE
 
 
-def validate(status: RobotStatus, detail: Detail | None = None, *, stops_cut_power: bool = True) -> str | None:
+def assumptions(hardware: object) -> dict[str, bool]:
+    """What a hardware interface says about power, as arguments of `validate`."""
+    return {name: bool(getattr(hardware, name, True)) for name in ("stops_cut_power", "motion_needs_power")}
+
+
+def validate(
+    status: RobotStatus,
+    detail: Detail | None = None,
+    *,
+    stops_cut_power: bool = True,
+    motion_needs_power: bool = True,
+) -> str | None:
     """The first invariant that a status and its detail violate, as a sentence; None if they are valid.
 
     A value of the wrong type is reported with the name of its field. Without a detail, the status alone is checked.
-    `stops_cut_power` is that of the hardware interface.
+    `stops_cut_power` and `motion_needs_power` are those of the hardware interface.
     """
     found = _wrong_type(status) or (None if detail is None else _wrong_detail(detail))
     if found is None and (detail is None or not detail.members):
-        found = _powered_in_part(status, stops_cut_power)
+        found = _powered_in_part(status, stops_cut_power, motion_needs_power)
     return found or _broken(status) or (None if detail is None else _contradiction(status, detail))
 
 
@@ -43,11 +54,11 @@ def _wrong_type(status: object) -> str | None:
 _ENUMS: Final = {Kind.MODE: RobotMode, Kind.TRI_STATE: TriState}
 
 
-def _powered_in_part(status: RobotStatus, stops_cut_power: bool) -> str | None:
+def _powered_in_part(status: RobotStatus, stops_cut_power: bool, motion_needs_power: bool) -> str | None:
     """The invariants of a single robot. In a group some parts may be stopped while others are powered."""
     if stops_cut_power and status.e_stopped is TRUE and status.drives_powered is not FALSE:
         return "I1: e_stopped is TRUE, so drives_powered must be FALSE"
-    if status.drives_powered is FALSE and status.motion_possible is not FALSE:
+    if motion_needs_power and status.drives_powered is FALSE and status.motion_possible is not FALSE:
         return "I2: drives_powered is FALSE, so motion_possible must be FALSE"
     return None
 
@@ -125,6 +136,10 @@ def _are_words(value: object) -> bool:
     return isinstance(value, tuple) and all(isinstance(word, str) for word in value)
 
 
+def _is_not_ready(value: object) -> bool:
+    return isinstance(value, NotReady) and isinstance(value.handle, str) and isinstance(value.why, str)
+
+
 _MEMBERS: Final[tuple[tuple[str, Callable[[object], bool], str], ...]] = (
     ("system", _is_id, "an id from 0 to 255 or None"),
     ("component", _is_id, "an id from 0 to 255 or None"),
@@ -136,5 +151,6 @@ _MEMBERS: Final[tuple[tuple[str, Callable[[object], bool], str], ...]] = (
     ),
     ("vehicle", _is_vehicle, "a Vehicle"),
     ("link", lambda v: isinstance(v, LinkState), "a LinkState"),
-    ("members", lambda v: isinstance(v, tuple) and all(isinstance(i, str) for i in v), "a tuple of names of handles"),
+    ("members", _are_words, "a tuple of names of handles"),
+    ("not_ready", lambda v: isinstance(v, tuple) and all(map(_is_not_ready, v)), "a tuple of NotReady"),
 )

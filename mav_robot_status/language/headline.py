@@ -87,6 +87,12 @@ FIRST_WORDS: Final = {
     "E_STOPPED": "Emergency stop engaged",
 }
 """What the first sentence calls a cause."""
+OF_A_MEMBER: Final = {
+    "E_STOPPED": "is stopped",
+    UNHEARD: "is LOST and may move",
+    "MOTION_UNKNOWN": "is UNKNOWN and may move",
+}
+"""What a member of a group is that is not ready, by the reason."""
 UNTOLD: Final = UNSURE | {"E_STOPPED"}
 """The inhibits that another sentence tells."""
 
@@ -105,7 +111,9 @@ def headline(line: Line, last: Line | None = None, members: Mapping[str, Line] |
     worst = min((one.state for one in wrong), key=_rank, default=None)
     if worst is not None and worst.rank < rank:
         tone, rank = worst.tone, worst.rank
-    sentences = (*_of_members(own), *_why(line, last, state))
+    if not own and any(one.get("why") == "E_STOPPED" for one in causes(line, "not_ready")):
+        tone, rank = EMERGENCY_STOP.tone, EMERGENCY_STOP.rank  # another member may still move
+    sentences = (*(_of_members(own) if own else _not_ready(line)), *_why(line, last, state))
     reported = [one.cause for one in wrong if one.cause] + _inhibits(line)
     steps = [remedy({"name": UNHEARD})] if state in (LOST, NOT_HEARD) else [remedy(cause) for cause in reported]
     step = next((one for one in steps if one.person), steps[0] if steps else None)
@@ -123,11 +131,22 @@ def _members(line: Line) -> list[str]:
 
 def _of_members(lines: Mapping[str, Line]) -> Iterator[Sentence]:
     """What each member of a group is: `base is stopped; arm is READY and may move`."""
-    if not lines:
-        return
     states = {name: state_of(line) for name, line in lines.items()}
     told = sorted(states.items(), key=lambda one: one[1].rank)
     yield Sentence("; ".join(f"{name} {state.member}{_may(lines[name], state)}" for name, state in told))
+
+
+def _not_ready(line: Line) -> Iterator[Sentence]:
+    """The same of a group whose members have no lines here, as far as its own line tells."""
+    why = {str(one.get("handle")): str(one.get("why")) for one in causes(line, "not_ready")}
+    if why:
+        yield Sentence("; ".join(f"{name} {_of_a_member(why.get(name))}" for name in _members(line)))
+
+
+def _of_a_member(why: str | None) -> str:
+    if why is None:
+        return "is READY and may move"
+    return OF_A_MEMBER.get(why) or f"is not ready: {remedy({'name': why}).sentence}"
 
 
 def _may(line: Line, state: State) -> str:

@@ -31,7 +31,7 @@ def members(handle: str, status: RobotStatus, detail: Detail) -> JsonObject:
         "errors": [error.members() for error in detail.errors],
         "inhibits": [inhibit.members() for inhibit in detail.inhibits],
         "vehicle": detail.vehicle.members(),
-        **({"members": list(detail.members)} if detail.members else {}),
+        **detail.group_members(),
         "link": {"state": detail.link.value},
     }
 

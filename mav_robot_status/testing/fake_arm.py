@@ -64,7 +64,7 @@ class RtdeServer:
             if len(self._rest) < size:
                 break
             answer += self._answer(kind, self._rest[HEADER.size : size])
-            self._rest = self._rest[size:]
+            self._rest = b"" if self._arm.drops_what_follows else self._rest[size:]
         return answer
 
     def due(self, now: float) -> bytes:
@@ -83,7 +83,7 @@ class RtdeServer:
         if kind == VERSION:
             return frame(VERSION, bytes([self._arm.speaks_version_2]))
         if kind == CONTROLLER:
-            return frame(CONTROLLER, FIRMWARE.pack(*self._arm.firmware, 0))
+            return frame(CONTROLLER, FIRMWARE.pack(*self._arm.firmware, 0)) if self._arm.tells_version else b""
         if kind == OUTPUTS:
             return self._recipe(payload)
         if kind == START:
@@ -108,14 +108,16 @@ class FakeArm:
 
     def __init__(self, port: int = 0, dashboard_port: int = 0, host: str = "127.0.0.1") -> None:
         """Listen on an address of the loopback; port 0: any."""
-        self.robot_mode, self.robot_bits, self.safety_bits = 7, 0b11, 0b1
+        self.robot_mode, self.robot_bits, self.safety_bits, self.safety_status = 7, 0b11, 0b1, 1
         self.joint_speeds: tuple[float, ...] = (0.0,) * 6
         self.operational: str | None = "AUTOMATIC"
         """The answer of the dashboard server; None: it does not know the question."""
         self.firmware = (5, 11, 1)
-        self.speaks_version_2 = True
+        self.speaks_version_2 = self.tells_version = True
         self.unknown: frozenset[str] = frozenset()
         """Names of values that it does not know."""
+        self.drops_what_follows = False
+        """It processes the first frame of each read, and drops the others."""
         self.silent = False
         """It stays connected and sends nothing."""
         self.garbage = b""
@@ -145,7 +147,7 @@ class FakeArm:
         return {
             "timestamp": time.monotonic(),
             "robot_mode": self.robot_mode,
-            "safety_status": 1,
+            "safety_status": self.safety_status,
             "runtime_state": 1,
             "robot_status_bits": self.robot_bits,
             "safety_status_bits": self.safety_bits,
@@ -156,12 +158,13 @@ class FakeArm:
 
     def run_program(self, moving: bool = True) -> None:
         """Powered, no stop; its joints move or stand."""
-        self.robot_mode, self.robot_bits, self.safety_bits = 7, 0b11, 0b1
+        self.robot_mode, self.robot_bits, self.safety_bits, self.safety_status = 7, 0b11, 0b1, 1
         self.joint_speeds = (0.2 if moving else 0.0,) * 6
 
     def press_emergency_stop(self) -> None:
         """The button on the arm: the power goes, the joints stand."""
-        self.robot_mode, self.robot_bits, self.safety_bits = 3, 0, 1 << 6 | 1 << 7 | 1 << 10
+        self.robot_mode, self.robot_bits = 3, 0
+        self.safety_bits, self.safety_status = 1 << 6 | 1 << 7 | 1 << 10, 7
         self.joint_speeds = (0.0,) * 6
 
     def drop_clients(self) -> None:

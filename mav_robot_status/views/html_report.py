@@ -41,6 +41,8 @@ VALUES: Final[dict[str, tuple[str, ...]]] = {
 """The values of each track. The totals list all of them, even those that never occurred."""
 LOOKS_OF: Final = {**LOOKS, "armed": {True: YES, False: NO, None: UNKNOWN}}
 """The looks of each track. A flight mode has its own name."""
+NOT_READY: Final = "not ready: "
+"""Before the member and its reason, on the page."""
 ESCAPES: Final = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&"})
 """Characters that could open or close an element; in JSON they occur in strings only."""
 
@@ -74,6 +76,7 @@ def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> JsonObject:
             **{name: _lasted(name, whole.values[name]) for name in TRACKS},
             "errors": [_reason_total(total) for total in whole.errors],
             "inhibits": [_reason_total(total, code=False) for total in whole.inhibits],
+            **_of_a_group(vehicle, [_reason_total(total, code=False) for total in whole.not_ready]),
         },
         "arm_cycles": [
             {**_interval(timeline, c.start, c.end), "armed_seconds": _seconds(c.armed)} for c in whole.arm_cycles
@@ -82,8 +85,14 @@ def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> JsonObject:
             **{name: [_span(timeline, name, span) for span in vehicle.tracks[name]] for name in TRACKS},
             "errors": [{"code": r.code, **_reason(timeline, r)} for r in vehicle.errors],
             "inhibits": [_reason(timeline, r) for r in vehicle.inhibits],
+            **_of_a_group(vehicle, [_reason(timeline, r) for r in vehicle.not_ready]),
         },
     }
+
+
+def _of_a_group(vehicle: VehicleTimeline, not_ready: list[JsonObject]) -> JsonObject:
+    """What only a group has."""
+    return {"not_ready": not_ready} if vehicle.members else {}
 
 
 def _lasted(track: str, values: dict[str, int]) -> dict[str, float]:
@@ -211,6 +220,8 @@ def _page_vehicle(vehicle: VehicleTimeline, strings: _Numbered) -> JsonObject:
     for kind, found in by_name.items():
         for title, reasons in _by_title(getattr(vehicle, kind)).items():
             found[title] = _in_a_row(reasons)
+    for title, reasons in _by_title(vehicle.not_ready).items():
+        by_name["inhibits"][NOT_READY + title] = _in_a_row(reasons)
     whole = totals(vehicle)
     return {
         "name": _title(vehicle),
@@ -277,7 +288,8 @@ def _lists(whole: Totals) -> dict[str, list[JsonObject]]:
     return {
         "arm_cycles": [cycle._asdict() for cycle in whole.arm_cycles],
         "errors": [{**_total(t), "kind": "error", "tone": "alarm"} for t in whole.errors],
-        "inhibits": [_inhibit(t) for t in whole.inhibits],
+        "inhibits": [*(_inhibit(t) for t in whole.inhibits), *(_not_ready(t) for t in whole.not_ready)],
+        "not_ready": [],
     }
 
 
@@ -293,6 +305,11 @@ def _inhibit(total: ReasonTotal) -> JsonObject:
         return {**_total(total), "kind": "unknown", "tone": "unknown"}
     tone = "warning" if remedy({"name": total.name}).person else "calm"
     return {**_total(total), "kind": "inhibit", "tone": tone}
+
+
+def _not_ready(total: ReasonTotal) -> JsonObject:
+    """A member of a group that could not work, whether or not another one could move."""
+    return {**_total(total), "name": NOT_READY + total.title, "kind": "not_ready", "tone": "warning"}
 
 
 def _asset(name: str) -> str:

@@ -75,6 +75,8 @@ class VehicleTimeline:
     errors: list[Reason] = field(default_factory=list)
     inhibits: list[Reason] = field(default_factory=list)
     """In order of their ends. Those of the same title and text do not overlap; an inhibit may have several texts."""
+    not_ready: list[Reason] = field(default_factory=list)
+    """Why members of a group could not work, in order of their ends. Empty for a single robot."""
     members: tuple[str, ...] = ()
     """The handles of a group. Empty for a single robot."""
     name: str | None = None
@@ -151,6 +153,7 @@ class _Recorder:
         self._values: dict[str, Span] = {}
         self._errors: dict[_Named, Reason] = {}
         self._inhibits: dict[_Named, Reason] = {}
+        self._not_ready: dict[_Named, Reason] = {}
 
     def sample(self, handle: IndustrialRobotStatusHandle, at: int) -> None:
         status, detail = handle.status, handle.detail
@@ -168,13 +171,16 @@ class _Recorder:
         errors = [Reason(at, at, error.name, error.code, error.text, error.handle) for error in detail.errors]
         inhibits = [Reason(at, at, one.name, None, one.text, one.handle) for one in detail.inhibits]
         _follow(self._errors, vehicle.errors, errors, at)
+        not_ready = [Reason(at, at, one.why, None, None, one.handle) for one in detail.not_ready]
         _follow(self._inhibits, vehicle.inhibits, inhibits, at)
+        _follow(self._not_ready, vehicle.not_ready, not_ready, at)
 
     def end(self, at: int) -> None:
         for name, span in self._values.items():
             _close(self.vehicle.tracks[name], span, at)
         _follow(self._errors, self.vehicle.errors, (), at)
         _follow(self._inhibits, self.vehicle.inhibits, (), at)
+        _follow(self._not_ready, self.vehicle.not_ready, (), at)
         self._seen = None
         self._values = {}
 

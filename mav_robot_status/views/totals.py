@@ -53,6 +53,8 @@ class Totals(NamedTuple):
     errors: tuple[ReasonTotal, ...]
     inhibits: tuple[ReasonTotal, ...]
     """Errors and inhibits are in order of their active time, the longest first."""
+    not_ready: tuple[ReasonTotal, ...]
+    """Why members of a group could not work, in the same order."""
     linked: int
     """The time in which the link was connected."""
     linked_values: dict[str, dict[str, int]]
@@ -69,6 +71,7 @@ def totals(vehicle: VehicleTimeline) -> Totals:
         arm_cycles(vehicle.tracks["armed"]),
         reason_totals(vehicle.errors),
         reason_totals(vehicle.inhibits),
+        reason_totals(vehicle.not_ready),
         sum(span.end - span.start for span in linked),
         {name: durations(within(spans, linked)) for name, spans in vehicle.tracks.items()},
     )

@@ -17,6 +17,7 @@ import signal
 import subprocess
 import sys
 import threading
+import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from datetime import datetime, timedelta, timezone
@@ -29,6 +30,7 @@ from mav_robot_status.interface import (
     Detail,
     ErrorCause,
     Inhibit,
+    NotReady,
     RobotMode,
     RobotStatus,
     RobotStatusMsg,
@@ -120,7 +122,10 @@ def _native(shown: dict[str, Any]) -> str:
     values = {name: TriState(-1 if shown[name] is None else shown[name]) for name in RobotStatus._fields[1:-1]}
     status = RobotStatus(mode=RobotMode[shown["mode"]], **values, error_code=shown["error_code"])
     vehicle, members = Vehicle(**shown["vehicle"]), tuple(shown.get("members", ()))
-    detail = Detail(shown["system"], shown["component"], causes, inhibits, vehicle, members=members)
+    not_ready = tuple(NotReady(**one) for one in shown.get("not_ready", ()))
+    detail = Detail(
+        shown["system"], shown["component"], causes, inhibits, vehicle, members=members, not_ready=not_ready
+    )
     msg = RobotStatusMsg(shown["handle"], _us(shown["stamp"]), status, detail, shown["link"]["heartbeat_age"])
     return json_lines.native(msg, shown["seq"], json_lines.native_body(msg.handle, status, detail))
 
@@ -346,3 +351,56 @@ def _vehicle(
 def _shape(value: object) -> object:
     """The keys and types of a value."""
     return {key: _shape(item) for key, item in value.items()} if isinstance(value, dict) else type(value)
+
+
+# -- ROS -------------------------------------------------------------------------------------------------------------
+
+NOT_RUN = {
+    "rosparam ": "no ROS 1",
+    "rosrun ": "no ROS 1",
+    "rostopic ": "no ROS 1",
+    "roslaunch ": "no ROS 1",
+    "ros2 ": "no ros2 command: the tests use rclpy",
+    "export RMW_IMPLEMENTATION": "for ros2",
+    "git clone ": "no network in tests",
+    "colcon ": "no colcon",
+    "source install/": "what colcon builds",
+}
+"""The beginnings of commands in the documents about ROS that nothing here can run, and why."""
+
+
+def test_every_command_about_ros_is_run_or_has_a_reason() -> None:
+    """The blocks in bash are run above; a prompt shows an output, which tests of the command compare."""
+    pages = [block for block in blocks("text") if block.document.name in ("ros.md", "ros2.md")]
+    lines = [line for block in pages if not block.code.startswith("$ ") for line in block.code.splitlines() if line]
+    assert lines
+    assert not [line for line in lines if not line.startswith(tuple(NOT_RUN))]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=name_of)
+def test_no_document_has_a_ros_command_that_does_not_work(document: pathlib.Path) -> None:
+    text = document.read_text()
+    assert "_robot_ip_address" not in text
+    assert not re.search(r"branch `?ros2`?\b(?!_)", text)
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("robot_state.launch", {"arg", "param", "rosparam", "node"}),
+        ("mav_robot_status.launch.xml", {"arg", "executable"}),
+    ],
+)
+def test_a_launch_file_parses_and_starts_what_the_documents_name(name: str, parts: set[str]) -> None:
+    launch = ET.parse(ROOT / "contrib" / "ros" / name).getroot()
+    assert (launch.tag, {part.tag for part in launch}) == ("launch", parts)
+    arguments = {one.get("name") for one in launch.iter("arg")}
+    text = ET.tostring(launch, encoding="unicode")
+    assert set(re.findall(r"\$\((?:var|arg) (\w+)\)", text)) == arguments
+    for executable in launch.iter("executable"):
+        command = str(executable.get("cmd"))
+        for one in launch.iter("arg"):
+            command = command.replace(f"$(var {one.get('name')})", str(one.get("default")))
+        assert command == "mav-robot-status udp:0.0.0.0:14550 --json none --ros2 dds://"
+    for node in launch.iter("node"):
+        assert (node.get("pkg"), node.get("type")) == ("industrial_robot_client", "robot_state")

@@ -35,7 +35,7 @@ from .documents import DOCUMENTS, ROOT, blocks, links, name_of, prose, table
 
 WHOLE = ("gateway", "views", "hardware", "publishers", "interface")
 """Folders whose every part is in the picture of the architecture page."""
-OTHER_TOOLS = {"--dialect", "--check", "--reference"}  # options of MAVProxy, ruff and chown
+OTHER_TOOLS = {"--dialect", "--check", "--reference", "--packages-select"}  # of MAVProxy, ruff, chown and colcon
 NO_KEYS = ("controllers", "interfaces", "names", "without_effect")
 """Fields of a configuration that are no keys: other keys at the top, parts of two lists, keys of former versions."""
 
@@ -176,7 +176,8 @@ def test_every_deviation_from_the_original_controller_is_listed() -> None:
         for path in package.rglob("*.py")
         for _ in re.findall(r"ORIGINAL: \w", path.read_text())
     )
-    listed = sorted(row[0].split(",")[0] for row in table("docs/explanation/controller.md", "where"))
+    places = [row[0].split(",")[0] for row in table("docs/explanation/controller.md", "where")]
+    listed = sorted(place for place in places if place.endswith(".py"))
     assert listed == in_code
 
 
@@ -298,3 +299,10 @@ def test_each_test_that_the_threat_model_names_exists() -> None:
         places = (ROOT / "tests" / folder / file for folder in ("system", "unit/gateway", "unit/hardware/mavlink"))
         source = next(place for place in places if place.exists()).read_text("utf-8")
         assert [name for name in re.findall(r"`(\w+)`", names) if f"def {name}(" not in source] == []
+
+
+@pytest.mark.parametrize("first", ["parameter", "where"])
+def test_each_line_about_the_original_controller_names_its_test(first: str) -> None:
+    tests = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    for row in table("docs/explanation/controller.md", first):
+        assert f"def {row[-1]}(" in tests, row

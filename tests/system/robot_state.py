@@ -16,6 +16,8 @@ from ..deadline import SOON, allow
 TOPIC, REQUEST, REPLY = 1, 2, 3
 PING, STATUS = 1, 13
 LONGEST = 1000
+LAST = 44
+"""Bytes of a STATUS."""
 
 
 class Status(NamedTuple):
@@ -74,10 +76,12 @@ class RobotState:
         """Make a frame."""
         return struct.pack(f"{self._order}{4 + len(body)}i", 12 + 4 * len(body), kind, communication, 0, *body)
 
-    def wait_for_end(self) -> None:
-        """Read until the other end closes the connection."""
-        while self.socket.recv(1 << 16):
-            pass
+    def wait_for_end(self) -> bytes:
+        """Read until the other end closes the connection. Returns the last frame."""
+        data = b""
+        while more := self.socket.recv(1 << 16):
+            data = (data + more)[-LAST:]
+        return data
 
     def close(self) -> None:
         """Close the connection."""

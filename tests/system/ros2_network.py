@@ -36,13 +36,15 @@ NO_FAST_DDS = NO_DDS or (
 class Program:
     """One program, from `ready` to the end of its standard input."""
 
-    def __init__(self, *arguments: str, command: tuple[str, ...] = OURS) -> None:
+    def __init__(
+        self, *arguments: str, command: tuple[str, ...] = OURS, environment: dict[str, str] | None = None
+    ) -> None:
         self.process = subprocess.Popen(
             [*command, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env={**os.environ, "CYCLONEDDS_URI": LOOPBACK},
+            env={**os.environ, "CYCLONEDDS_URI": LOOPBACK} if environment is None else environment,
         )
         assert self.process.stdout is not None
         self.heard: list[dict[str, Any]] = []

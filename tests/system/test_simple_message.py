@@ -263,6 +263,33 @@ def test_a_client_finds_a_restarted_gateway_on_the_same_port(
     connect(again).wait_for(drives_powered=0)
 
 
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
+def test_the_last_status_of_a_gateway_that_ends_is_that_nothing_is_known(
+    gateway: StartGateway, wire: OpenWire, connect: Connect, end: signal.Signals
+) -> None:
+    gate = gateway(*PORT)
+    wire(gate.address).beating()
+    client = connect(gate)
+    client.wait_for(drives_powered=0)
+    assert gate.stop(end) == 0
+    assert struct.unpack("<11i", client.wait_for_end()) == (40, 13, 1, 0, *UNKNOWN)
+
+
+def test_after_a_reload_no_client_keeps_a_status_of_before(
+    gateway: StartGateway, wire: OpenWire, connect: Connect, tmp_path: Path
+) -> None:
+    file = tmp_path / "robot.yaml"
+    text = "links: ['udpin:127.0.0.1:0']\nvehicles: [{{system: {}, handle: rover}}]\n"
+    file.write_text(text.format(1))
+    gate = gateway("--config", str(file), "--simple-message", "127.0.0.1:0")
+    wire(gate.address).beating()
+    client = connect(gate)
+    client.wait_for(drives_powered=0)
+    file.write_text(text.format(2))
+    gate.process.send_signal(signal.SIGHUP)
+    assert struct.unpack("<11i", client.wait_for_end()) == (40, 13, 1, 0, *UNKNOWN)
+
+
 def test_a_killed_gateway_frees_its_port(gateway: StartGateway, wire: OpenWire, connect: Connect) -> None:
     gate = gateway(*PORT)
     client, address = connect(gate), where(gate)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import threading
 from collections.abc import Iterable, Mapping, Sequence
 
 import pytest
@@ -155,6 +156,25 @@ def test_a_message_has_the_time_of_the_update_and_the_name_of_its_handle() -> No
     assert msg.unix_us == START.unix_us + 250_000
     assert (msg.handle, msg.status.error_code, msg.detail) == (DEFAULT_HANDLE_NAME, 7, rig.handle.detail)
     assert msg.heartbeat_age == pytest.approx(0.25)
+
+
+def test_the_controller_reads_the_registered_handle_itself() -> None:
+    rig = Rig(PERIODIC_ONLY)
+    registered = rig.hw.get(IndustrialRobotStatusInterface).get_handle(DEFAULT_HANDLE_NAME)
+    registered.status = Status(in_error=TriState.TRUE, error_code=7)
+    rig.update(0.2)
+    assert rig.out.messages[0].status is registered.status
+
+
+def test_a_message_is_handed_over_in_the_thread_of_the_update() -> None:
+    threads = []
+
+    class Remembers(Collector):
+        def publish(self, msg: RobotStatusMsg) -> None:
+            threads.append(threading.current_thread())
+
+    Rig(PERIODIC_ONLY, Remembers()).update(0.2)
+    assert threads == [threading.current_thread()]
 
 
 def test_a_robot_without_a_heartbeat_has_no_age() -> None:

@@ -51,7 +51,7 @@ class RtdeTalk:
     """Asks for the values of an arm."""
 
     def __init__(self) -> None:
-        self._session = Session(NAMES, RATE)
+        self._session = Session(NAMES, RATE, with_firmware=False)
 
     def ask(self) -> bytes:
         """The next frames of the session."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from typing import Final, NamedTuple
 
-from ...publishers.ros.messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS
+from ...publishers.ros.messages import DIAGNOSTIC_ARRAY, HARDWARE_STATUS, ROBOT_STATUS, kind_of
 from ...publishers.ros.publisher import extra_of
 from ...publishers.ros.settings import DDS, ZENOH, Ros2Settings
 from ...publishers.ros.transport import Endpoint, UnreachableError
 from .diagnosis import Case, Diagnosis, first_case
 
-TYPES: Final = {kind.dds_name: kind for kind in (ROBOT_STATUS, DIAGNOSTIC_ARRAY)}
+TYPES: Final = {kind.dds_name: kind for kind in (ROBOT_STATUS, DIAGNOSTIC_ARRAY, HARDWARE_STATUS)}
 MOST_SHOWN: Final = 8
 """Subscriptions in the text. The JSON has all."""
 
@@ -34,6 +34,11 @@ class Ros2Findings(NamedTuple):
     def foreign(self) -> tuple[Endpoint, ...]:
         """The subscriptions in our domain that have another definition of the message."""
         return tuple(one for one in self.here if not _is_ours(one))
+
+    @property
+    def unmatched(self) -> tuple[Endpoint, ...]:
+        """The subscriptions in our domain that DDS does not match with our topics."""
+        return tuple(one for one in self.here if one.matched is False)
 
 
 def _echo(f: Ros2Findings) -> str:
@@ -59,10 +64,17 @@ CASES: Final = (
          lambda f: not f.here,
          lambda f: f"it can be reached, but nobody subscribes in domain {f.settings.domain}",
          lambda f: f"{_echo(f)}, on the computer that should show it"),
+    Case("ros2-not-matched", "DDS does not match a subscriber with our topics: another type or quality of service",
+         lambda f: f.unmatched,
+         lambda f: f"{_matches(f)}: {_named(f.unmatched[0])}, but {f.unmatched[0].why}",
+         lambda f: "let it use our type (industrial_msgs/msg/RobotStatus, diagnostic_msgs/msg/DiagnosticArray) and "
+         "the default quality of service of ROS 2",
+         spoils=True),
     Case("ros2-other-definition", "a subscriber has another definition of the message and receives nothing",
          lambda f: f.foreign,
          lambda f: f"{_named(f.foreign[0])} has another definition of the message",
-         lambda f: "let it use industrial_msgs of the branch ros2 of industrial_core, and ROS 2's diagnostic_msgs",
+         lambda f: "let it use industrial_msgs of the branch ros2_msgs_only of industrial_core, and "
+         "ROS 2's diagnostic_msgs",
          spoils=True),
     Case("ros2-ok", "somebody subscribes",
          lambda f: True,
@@ -83,8 +95,8 @@ def examine(settings: Ros2Settings) -> Ros2Findings:
         found = subscriptions_of(settings)
     except UnreachableError as error:
         return Ros2Findings(settings, str(error))
-    name = f"/{settings.topic}"
-    return Ros2Findings(settings, None, tuple(e for e in found if e.dds_type in TYPES or e.topic.endswith(name)))
+    ours = (one for one in found if one.dds_type in TYPES or kind_of(one.topic, settings) is not None)
+    return Ros2Findings(settings, None, tuple(ours))
 
 
 def diagnose(f: Ros2Findings) -> Diagnosis:
@@ -108,6 +120,12 @@ def as_json(url: str, f: Ros2Findings, diagnosis: Diagnosis) -> str:
             "subscriptions": [one._asdict() for one in f.subscriptions],
         }
     )
+
+
+def _matches(f: Ros2Findings) -> str:
+    heard = len(f.here) - len(f.unmatched)
+    some = "1 subscriber" if len(f.here) == 1 else f"{len(f.here)} subscribers"
+    return f"{some} in domain {f.settings.domain}, {heard or 'none'} {'match' if heard > 1 else 'matches'}"
 
 
 def _is_ours(one: Endpoint) -> bool:

@@ -10,6 +10,7 @@ import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface import Detail, Evidence, Inhibit, LinkState, RobotStatus, validate
+from ...interface.validation import assumptions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -44,10 +45,10 @@ class Checked(NamedTuple):
 class HandleCheck:
     """Makes a handle UNKNOWN while its values are invalid. Logs the first fault of each handle."""
 
-    def __init__(self, name: str, *, stops_cut_power: bool = True) -> None:
-        """`stops_cut_power` is that of the hardware interface with this name."""
+    def __init__(self, name: str, hardware: object = None) -> None:
+        """`hardware` is the hardware interface with this name."""
         self._name = name
-        self._stops_cut_power = stops_cut_power
+        self._assumptions = assumptions(hardware)
         self._checked: dict[str, Checked] = {}
         self._logged: set[str] = set()
 
@@ -83,9 +84,7 @@ class HandleCheck:
             _put(handle, _unknown(self._known(handle), why, now))
 
     def _check(self, handle: IndustrialRobotStatusHandle, given: Values, now: Instant) -> None:
-        fault = validate(given.status, given.detail, stops_cut_power=self._stops_cut_power) or _wrong_evidence(
-            given.evidence
-        )
+        fault = validate(given.status, given.detail, **self._assumptions) or _wrong_evidence(given.evidence)
         if fault is None:
             self._checked[handle.name] = Checked(given, given, given.detail)
             _put(handle, given)

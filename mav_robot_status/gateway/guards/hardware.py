@@ -49,7 +49,7 @@ class GuardedHardware:
         self._read_at = self._paused_until = -math.inf
         self._was_slow = self._lost = self._suspended = False
         self._why = "its hardware interface has failed"
-        self._check = HandleCheck(name, stops_cut_power=bool(getattr(hardware, "stops_cut_power", True)))
+        self._check = HandleCheck(name, hardware)
         self._sources: list[GuardedSource] = []
         self.handles = hardware.handles
         self.changed = False

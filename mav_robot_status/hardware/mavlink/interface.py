@@ -9,20 +9,18 @@ its facts, and derives a status if they have changed.
 
 from __future__ import annotations
 
-import logging
 import math
 from typing import TYPE_CHECKING, Any, Final
 
 from ...due_times import DueTimes
 from ...interface import LinkState, RobotHW
 from ...mavlink import definitions as mav
-from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
+from . import vehicle_log
 from .autopilots.wanted import METADATA
 from .belief import Belief
 from .estop.applet import is_word
-from .estop.messages import overheard
-from .faults.messages import TRANSMITTERS, transmitter_heard
-from .identity import is_autopilot, named
+from .faults.messages import TRANSMITTERS
+from .identity import is_autopilot
 from .options import HardwareOptions
 from .readiness.rule import inhibit
 from .reason import EvidenceOfVehicle
@@ -30,21 +28,18 @@ from .requests.scheduler import Ask, RequestScheduler
 from .satellite.state import stated
 from .slots import VehicleSlots
 from .subjects import APPLET_ID, ARM_STATUS_ID, COMMAND_IDS, EDGES, FILE_IDS, HEARTBEAT_ID, HIGH_LATENCY_ID
+from .update import on_arm_status, on_command, status_at
 from .update import on_frame as apply_frame
-from .update import status_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Container, Hashable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Container, Hashable, Iterable, Iterator, Sequence
 
     from ...clock import Instant
     from ...mavlink.framing import Values
     from .derive import Derived
     from .facts import Facts
     from .px4_events import EventTable
-    from .state import VehicleState
     from .vehicle import ExpectedVehicle, Names, TrackedVehicle
-
-log = logging.getLogger(__name__)
 
 LEAST_WAIT: Final = 1e-3
 """Seconds to the next look at a vehicle, at least: sums of times are rounded."""
@@ -135,7 +130,7 @@ class MavlinkRobotHW(RobotHW):
         """
         message_id, ids, _, message, _, _ = frame
         if message_id in COMMAND_IDS and message is not None:
-            self._overhear(message, ids, now)
+            self._touch_all(on_command(self._tracked.values(), message, ids, now))
         tracked = self._tracked.get(ids) or self._first_heard(frame, now)
         if tracked is None:
             return None
@@ -167,7 +162,7 @@ class MavlinkRobotHW(RobotHW):
         if message_id == HIGH_LATENCY_ID and is_autopilot(stated(message), ids[1]):
             return self._discover(ids, stated(message), now)
         if message_id == ARM_STATUS_ID and ids[1] in TRANSMITTERS:
-            self._hear_transmitter(message, ids, now)
+            self._touch_all(on_arm_status(self._tracked.values(), message, ids, now))
         elif message_id == APPLET_ID and is_word(message):
             self.ignored_words += 1
         return None
@@ -177,6 +172,10 @@ class MavlinkRobotHW(RobotHW):
         if not tracked.touched or due < tracked.due:
             tracked.touched, tracked.due = True, min(due, tracked.due)
             self._due.set(tracked, tracked.due)
+
+    def _touch_all(self, changed: Iterable[TrackedVehicle]) -> None:
+        for tracked in changed:
+            self._touch(tracked, -math.inf)
 
     def read(self, now: Instant) -> None:
         """Update the handles to `now`."""
@@ -270,25 +269,6 @@ class MavlinkRobotHW(RobotHW):
                 tracked.handle.detail = tracked.handle.detail._replace(inhibits=(unheard,))
                 self.changed = True
 
-    def _overhear(self, message: mav.CommandInt | mav.CommandLong, sender: tuple[int, int], now: Instant) -> None:
-        """Note a command that a ground station sends to one of the vehicles."""
-        for (system, component), tracked in self._tracked.items():
-            addressed = message.target_system == system and message.target_component in (0, component)
-            if addressed and tracked.state is not None:
-                before = tracked.state.stop
-                overheard(tracked.state, message, sender, now)
-                if tracked.state.stop is not before:
-                    self._touch(tracked, -math.inf)
-
-    def _hear_transmitter(self, message: mav.OpenDroneIdArmStatus, sender: tuple[int, int], now: Instant) -> None:
-        """Note what a Remote ID transmitter says to the autopilot of its system."""
-        for (system, _), tracked in self._tracked.items():
-            if system == sender[0] and tracked.state is not None:
-                before = tracked.state.faulty_parts
-                transmitter_heard(tracked.state, message, sender[1], now)
-                if tracked.state.faulty_parts is not before:
-                    self._touch(tracked, -math.inf)
-
     def _on_file_message(self, tracked: TrackedVehicle, message: Any, now: Instant) -> None:
         """Hand on where a table of events is, or a piece of it."""
         if type(message) is mav.ComponentMetadata and tracked.requests is not None:
@@ -301,13 +281,12 @@ class MavlinkRobotHW(RobotHW):
         gone = self._slots.room_for(ids, now.mono, self.options)
         if gone:
             self._remove(gone)
-        tracked = (None if gone is None else self._slots.place(ids)) or self._succeed(ids)
+        tracked = (None if gone is None else self._slots.place(ids)) or self._slots.succeed(ids)
         if tracked is None:
             self.ignored += 1
             return None
-        names = named(mav.AUTOPILOT_NAMES, heartbeat.autopilot), named(mav.TYPE_NAMES, heartbeat.type)
-        called = "" if tracked.name is None else f" '{tracked.name}'"
-        log.info("heard vehicle %d.%d%s (%s, %s): handle '%s'", *ids, called, *names, tracked.handle.name)
+        self._due.set(tracked, math.inf)
+        vehicle_log.heard(tracked, heartbeat)
         self._give_event_table(tracked)
         return tracked
 
@@ -319,26 +298,6 @@ class MavlinkRobotHW(RobotHW):
             self._slots.remove(tracked)
             self._due.set(tracked, math.inf)
         self._unheard = self.changed = True
-
-    def _succeed(self, ids: tuple[int, int]) -> TrackedVehicle | None:
-        """The vehicle whose entry leaves the component open, if this sender takes it over from the one before.
-
-        Component 1 is the autopilot: it takes the entry at once from another component of its system, but not from one
-        that is armed.
-        """
-        if ids[1] != MAV_COMP_ID_AUTOPILOT1:
-            return None
-        for tracked in self._slots.expected:
-            owner = tracked.ids
-            if owner is None or tracked.slot.component is not None or owner[0] != ids[0] or _is_armed(tracked):
-                continue
-            log.info("vehicle %d.%d: its handle '%s' is now that of %d.%d", *owner, tracked.handle.name, *ids)
-            tracked.forget()
-            self._due.set(tracked, math.inf)
-            tracked.requests = tracked.parameters = None
-            self._slots.give(tracked, ids)
-            return tracked
-        return None
 
     def _update(self, tracked: TrackedVehicle, now: Instant) -> None:
         """Update the handle of a vehicle to `now`."""
@@ -353,13 +312,17 @@ class MavlinkRobotHW(RobotHW):
             tracked.requests = tracked.parameters = None
             tracked.handle.heard_at = state.latest.heartbeat.at if state.latest.heartbeat else None
             if (before.autopilot, before.vehicle_type) != (state.autopilot, state.vehicle_type):
-                log.warning("vehicle %d.%d: another vehicle has these ids now", *(tracked.ids or (0, 0)))
+                vehicle_log.exchanged(tracked)
         if state.boots != tracked.boots:
-            self._report_reboot(tracked, state, now)
+            tracked.boots = state.boots
+            vehicle_log.rebooted(tracked)
+            if tracked.requests is not None:
+                tracked.requests.restart(now.mono)
+                self._asking.next_due = -math.inf
         facts = updated.facts
         if updated.derived is not None:
-            self._log_applet(tracked, facts)
-            self._log_heartbeats(tracked, facts, now)
+            vehicle_log.applet(tracked, facts)
+            self._follow_satellite(tracked, facts, now)
             tracked.facts = facts
             self._show(tracked, updated.derived)
             tracked.handle.evidence = EvidenceOfVehicle(state, facts, updated.derived.reasons)
@@ -367,58 +330,36 @@ class MavlinkRobotHW(RobotHW):
     def _show(self, tracked: TrackedVehicle, derived: Derived) -> None:
         """Set the status in the handle."""
         handle, detail = tracked.handle, derived.detail
-        self._log_link(tracked, detail.link)
+        self._follow_link(tracked, detail.link)
         if tracked.name is not None:
             detail = detail._replace(vehicle=detail.vehicle._replace(name=tracked.name))
         if derived.status != handle.status or detail != handle.detail:
             handle.status, handle.detail = derived.status, detail
             self.changed = True
 
-    def _report_reboot(self, tracked: TrackedVehicle, state: VehicleState, now: Instant) -> None:
-        tracked.boots = state.boots
-        log.info("vehicle %d.%d has rebooted", *(tracked.ids or (0, 0)))
-        if tracked.requests is not None:
-            tracked.requests.restart(now.mono)
-            self._asking.next_due = -math.inf
-
-    def _log_applet(self, tracked: TrackedVehicle, facts: Facts) -> None:
-        was_heard = tracked.facts.applet.is_heard if tracked.facts else False
-        if facts.applet.is_heard is was_heard or not facts.fresh.heartbeat:
-            return
-        ids = tracked.ids or (0, 0)
-        if was_heard:
-            log.warning("vehicle %d.%d: the applet is silent, e_stopped is deduced again", *ids)
-        else:
-            log.info("vehicle %d.%d: the applet reports the emergency stop", *ids)
-
-    def _log_heartbeats(self, tracked: TrackedVehicle, facts: Facts, now: Instant) -> None:
-        """Log once that HIGH_LATENCY2 counts, or that HEARTBEATs do again: then ask again for what is missing."""
-        did_not = bool(tracked.facts) and tracked.facts.seldom is not None  # type: ignore[union-attr]
-        if did_not is (facts.seldom is not None):
-            return
-        ids = tracked.ids or (0, 0)
-        if did_not:
-            log.info("vehicle %d.%d sends HEARTBEATs", *ids)
-            self._asking.next_due = -math.inf
-            if tracked.requests is not None:
-                tracked.requests.look_again(now.mono)
-        else:
-            log.info("vehicle %d.%d is heard only through HIGH_LATENCY2: nothing is sent to it", *ids)
-
-    def _log_link(self, tracked: TrackedVehicle, state: LinkState) -> None:
+    def _follow_link(self, tracked: TrackedVehicle, state: LinkState) -> None:
+        """Its link has changed: count losses, and ask again when it is back."""
         before = tracked.handle.detail.link
         if state is before:
             return
         self._asking.next_due = -math.inf
-        ids = tracked.ids or (0, 0)
+        vehicle_log.link(tracked, before, state, tracked.timeout(self.options))
         if state is LinkState.LOST and before is LinkState.CONNECTED:
             tracked.losses += 1
             self._slots.lost(tracked, self.options)
-            log.warning("lost vehicle %d.%d: nothing for %g s", *ids, tracked.timeout(self.options))
-        elif state is LinkState.CONNECTED and before is LinkState.LOST:
-            log.info("vehicle %d.%d is back", *ids)
+        elif state is LinkState.CONNECTED and before is LinkState.LOST and tracked.requests is not None:
+            tracked.requests.reconnected(tracked.handle.heard_at or 0.0)
+
+    def _follow_satellite(self, tracked: TrackedVehicle, facts: Facts, now: Instant) -> None:
+        """HIGH_LATENCY2 counts now, or HEARTBEATs do again: then ask again for what is missing."""
+        did_not = bool(tracked.facts) and tracked.facts.seldom is not None  # type: ignore[union-attr]
+        if did_not is (facts.seldom is not None):
+            return
+        vehicle_log.satellite(tracked, did_not)
+        if did_not:
+            self._asking.next_due = -math.inf
             if tracked.requests is not None:
-                tracked.requests.reconnected(tracked.handle.heard_at or 0.0)
+                tracked.requests.look_again(now.mono)
 
 
 def _note_heartbeat(tracked: TrackedVehicle, message: mav.Heartbeat, at: float) -> TrackedVehicle | None:
@@ -433,9 +374,3 @@ def _note_statement(tracked: TrackedVehicle) -> None:
     """Note when the vehicle was last heard by HIGH_LATENCY2. One that is late does not count."""
     if tracked.state is not None and tracked.state.high_latency is not None:
         tracked.handle.heard_at = tracked.state.high_latency.at
-
-
-def _is_armed(tracked: TrackedVehicle) -> bool:
-    """Whether the vehicle is connected, and says that it may move."""
-    main = tracked.belief.main
-    return main is not None and main.armed and tracked.handle.detail.link is LinkState.CONNECTED

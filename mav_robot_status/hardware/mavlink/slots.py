@@ -10,6 +10,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from ...interface import DEFAULT_HANDLE_NAME, LinkState
+from ...mavlink.enumerations import MAV_COMP_ID_AUTOPILOT1
 from .vehicle import ExpectedVehicle, TrackedVehicle
 
 if TYPE_CHECKING:
@@ -85,6 +86,25 @@ class VehicleSlots:
         tracked.name = self._name(tracked.slot, *ids)
         tracked.belief = self._beliefs.setdefault(ids, belief or tracked.belief)
         self.tracked[ids] = tracked
+
+    def succeed(self, ids: Ids) -> TrackedVehicle | None:
+        """The vehicle whose entry leaves the component open, if this sender takes it over from the one before.
+
+        Component 1 is the autopilot: it takes the entry at once from another component of its system, but not from one
+        that is armed.
+        """
+        if ids[1] != MAV_COMP_ID_AUTOPILOT1:
+            return None
+        for tracked in self.expected:
+            owner = tracked.ids
+            if owner is None or tracked.slot.component is not None or owner[0] != ids[0] or tracked.is_armed:
+                continue
+            log.info("vehicle %d.%d: its handle '%s' is now that of %d.%d", *owner, tracked.handle.name, *ids)
+            tracked.forget()
+            tracked.requests = tracked.parameters = None
+            self.give(tracked, ids)
+            return tracked
+        return None
 
     def room_for(self, ids: Ids, now: float, options: HardwareOptions) -> list[TrackedVehicle] | None:
         """Whether a vehicle with these ids that sends its first HEARTBEAT gets a place.

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...mavlink.decode import text
-from ...mavlink.definitions import Heartbeat, Statustext
+from ...mavlink.definitions import CommandInt, CommandLong, Heartbeat, OpenDroneIdArmStatus, Statustext
+from . import vehicle_log
 from .armed import is_armed
 from .belief.belief import SAID_ONCE, Heard, Joined
 from .belief.clock import Change
 from .derive import derive
 from .estop import state as estop
+from .estop.messages import overheard
 from .facts import UNDISPUTED, Claimed, Deadline
+from .faults.messages import transmitter_heard
 from .faults.texts import pass_time
 from .heartbeat.messages import exchanged, rebooted, starts_anew
 from .heartbeat.state import missed
@@ -22,12 +24,11 @@ from .joined import joined
 from .motion import state as motion
 from .satellite.messages import follows, high_latency, sends_heartbeats
 from .satellite.state import stated, tells_armed
-from .senders import LATE, stranger
 from .state import VehicleState, begin, timeout_of
 from .subjects import HANDLERS_BY_ID, HEARTBEAT_ID, HIGH_LATENCY_ID, facts_of
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Sequence
+    from collections.abc import Hashable, Iterable, Iterator, Sequence
 
     from ...clock import Instant
     from ...mavlink.framing import Values
@@ -37,10 +38,6 @@ if TYPE_CHECKING:
     from .options import HardwareOptions
     from .vehicle import TrackedVehicle
 
-log = logging.getLogger(__name__)
-
-PACE: Final = 30.0
-"""Seconds between two log lines of one kind about one vehicle."""
 JUST_AFTER: Final = 1e-3
 
 
@@ -126,22 +123,7 @@ def _use(
     """One message changes the state of a speaker."""
     state: VehicleState | None = speaker.state
     if message_id in (HEARTBEAT_ID, HIGH_LATENCY_ID):
-        beat = message if message_id == HEARTBEAT_ID else stated(message)
-        if not is_autopilot(beat, tracked.component):
-            return
-        if state is not None and message_id == HIGH_LATENCY_ID and not _adds(state, message, said, options):
-            _compare(speaker, state, beat, said)
-            return
-        speaker.claim(beat, said)
-        is_first = state is None
-        if state is None:
-            if tracked.belief.starts(speaker, lambda old: _says_that_it_starts(speaker, old, beat), said.mono):
-                return
-            state = speaker.state = begin(beat, said)
-            state.event_table, state.arrived = tracked.event_table, said.mono
-        state.timeout = getattr(speaker.channel, "heartbeat_timeout", None)
-        if is_first and message_id == HEARTBEAT_ID:
-            return
+        state = _claim(tracked, speaker, message_id, message, said, options)
     if state is None:
         return
     if speaker.clock.booted is not None:
@@ -150,6 +132,28 @@ def _use(
         high_latency(state, message, said, options)
     elif (handler := HANDLERS_BY_ID.get(message_id)) is not None:
         handler(state, message, said, options)
+
+
+def _claim(
+    tracked: TrackedVehicle, speaker: Speaker, message_id: int, message: Any, said: Instant, options: HardwareOptions
+) -> VehicleState | None:
+    """A HEARTBEAT, or what stands for one, claims the ids. Returns the state that it changes, if it changes one."""
+    state: VehicleState | None = speaker.state
+    beat = message if message_id == HEARTBEAT_ID else stated(message)
+    if not is_autopilot(beat, tracked.component):
+        return None
+    if state is not None and message_id == HIGH_LATENCY_ID and not _adds(state, message, said, options):
+        _compare(speaker, state, beat, said)
+        return None
+    speaker.claim(beat, said)
+    is_first = state is None
+    if state is None:
+        if tracked.belief.starts(speaker, lambda old: _says_that_it_starts(speaker, old, beat), said.mono):
+            return None
+        state = speaker.state = begin(beat, said)
+        state.event_table, state.arrived = tracked.event_table, said.mono
+    state.timeout = getattr(speaker.channel, "heartbeat_timeout", None)
+    return None if is_first and message_id == HEARTBEAT_ID else state
 
 
 def _adds(state: VehicleState, message: Any, said: Instant, options: HardwareOptions) -> bool:
@@ -175,6 +179,35 @@ def _says_that_it_starts(speaker: Speaker, old: Speaker, beat: Any) -> bool:
     return says or starts_anew(state.latest.heartbeat.message, beat, state)
 
 
+# -- a frame of another sender -----------------------------------------------------------------------------------------
+
+
+def on_command(
+    vehicles: Iterable[TrackedVehicle], message: CommandInt | CommandLong, sender: tuple[int, int], now: Instant
+) -> Iterator[TrackedVehicle]:
+    """A command that a ground station sends to one of the vehicles. Yields those whose stop it puts in doubt."""
+    for tracked in vehicles:
+        system, component = tracked.ids or (0, 0)
+        addressed = message.target_system == system and message.target_component in (0, component)
+        if addressed and tracked.state is not None:
+            before = tracked.state.stop
+            overheard(tracked.state, message, sender, now)
+            if tracked.state.stop is not before:
+                yield tracked
+
+
+def on_arm_status(
+    vehicles: Iterable[TrackedVehicle], message: OpenDroneIdArmStatus, sender: tuple[int, int], now: Instant
+) -> Iterator[TrackedVehicle]:
+    """What a Remote ID transmitter says to the autopilot of its system. Yields the vehicles that it changes."""
+    for tracked in vehicles:
+        if tracked.ids is not None and tracked.ids[0] == sender[0] and tracked.state is not None:
+            before = tracked.state.faulty_parts
+            transmitter_heard(tracked.state, message, sender[1], now)
+            if tracked.state.faulty_parts is not before:
+                yield tracked
+
+
 # -- the status --------------------------------------------------------------------------------------------------------
 
 
@@ -190,10 +223,9 @@ def status_at(tracked: TrackedVehicle, now: Instant, options: HardwareOptions) -
     rivals = belief.rivals(now.mono, options.heartbeat_timeout) if _is_connected(main) else []
     if rivals:
         due = min(due, min(one.stands_until for one in rivals) + JUST_AFTER)
-        _tell_strangers(tracked, main, rivals, now.mono)
+        vehicle_log.strangers(tracked, main, rivals, now.mono)
     claimed, until = _claimed(tracked, [main, *rivals], now)
-    if main.lag > LATE:
-        _tell_late(tracked, main, now.mono)
+    vehicle_log.late(tracked, main, now.mono)
     basis = (claimed, main.facts, *(one.facts for one in rivals))
     if basis == tracked.basis:
         return Updated(main.facts, None, min(due, until))
@@ -231,41 +263,5 @@ def _claimed(tracked: TrackedVehicle, speakers: Sequence[Speaker], now: Instant)
     found = mixed or conflict
     if found is None:
         return UNDISPUTED, until
-    if tracked.conflict_since is not found.since:
-        tracked.conflict_since = found.since
-        channels = (count.channel for one in speakers for count in one.counts if count.channel is not None)
-        where = " and ".join(dict.fromkeys(map(str, channels)))
-        log.warning(
-            "two autopilots use the ids %d.%d%s (%s)", *(tracked.ids or (0, 0)), where and f": {where}", found.why
-        )
+    vehicle_log.conflict(tracked, found, speakers)
     return Claimed(found.since.unix_us, mixed is not None), min(until, belief.ends(found))
-
-
-# -- what is told ------------------------------------------------------------------------------------------------------
-
-
-def _tell_strangers(tracked: TrackedVehicle, main: Speaker, rivals: Sequence[Speaker], now: float) -> None:
-    """Log who speaks with the ids of the vehicle, and what ends that."""
-    found = stranger(main, rivals, now) if now >= tracked.tell_strangers_at else None
-    if found is None:
-        return
-    tracked.tell_strangers_at = now + PACE
-    cure = (
-        f"If one of them is yours, name it: {found.mine}"
-        if found.mine
-        else "Give each autopilot its own system id (SYSID_THISMAV)."
-    )
-    log.warning("Two senders speak as vehicle %d.%d: %s. %s", *(tracked.ids or (0, 0)), found.who, cure)
-
-
-def _tell_late(tracked: TrackedVehicle, main: Speaker, now: float) -> None:
-    if now >= tracked.tell_late_at:
-        tracked.tell_late_at = now + PACE
-        where = f" on {main.channel}" if main.channel is not None else ""
-        log.warning(
-            "vehicle %d.%d is heard %.1f s late%s: what is older than its time-out is unknown. Look for a radio or a "
-            "program that stores frames",
-            *(tracked.ids or (0, 0)),
-            main.lag,
-            where,
-        )

@@ -108,6 +108,12 @@ class TrackedVehicle:
         return 0 if self.ids is None else self.ids[1]
 
     @property
+    def is_armed(self) -> bool:
+        """Whether it is connected, and says that it may move."""
+        main = self.belief.main
+        return main is not None and main.armed and self.handle.detail.link is LinkState.CONNECTED
+
+    @property
     def costly(self) -> bool:
         """Whether it is heard only through HIGH_LATENCY2. Its link charges for each byte, so nothing is sent to it."""
         return self.state is not None and self.state.high_latency is not None

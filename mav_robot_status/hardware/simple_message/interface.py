@@ -25,6 +25,8 @@ class SimpleMessageRobotHW(TcpArm[StatusFrame]):
     """One robot, as a handle with the name of the interface."""
 
     options_type = SimpleMessageHardwareOptions
+    motion_needs_power = False
+    """A controller may switch the drives on for a motion command."""
 
     def __init__(self, context: HardwareContext) -> None:
         options = SimpleMessageHardwareOptions.read("simple_message", context.options)

@@ -1,6 +1,7 @@
 """A STATUS frame of simple_message as a RobotStatus with its reasons: pure functions.
 
 A controller may send any number. What has no meaning is UNKNOWN, and so are two values that contradict each other.
+By its definition, motion may be possible without drive power: a controller switches it on when it needs it.
 """
 
 from __future__ import annotations
@@ -30,8 +31,6 @@ def status_of(frame: StatusFrame) -> RobotStatus:
     if possible is TRUE and (powered is FALSE or stopped is TRUE):
         possible, powered = UNKNOWN, UNKNOWN if powered is FALSE else powered
         stopped = UNKNOWN if stopped is TRUE else stopped
-    elif powered is FALSE:
-        possible = FALSE
     return RobotStatus(
         mode=MODES.get(frame.mode, RobotMode.UNKNOWN),
         e_stopped=stopped,
@@ -63,17 +62,22 @@ def _errors(status: RobotStatus, frame: StatusFrame, before: Detail, unix_us: in
 
 
 def _inhibits(status: RobotStatus, before: Detail, unix_us: int) -> tuple[Inhibit, ...]:
-    """The reasons in the frame. A controller may have others, for which the frame has no field."""
-    if status.motion_possible is not FALSE:
+    """The reasons in the frame. A controller may have others, for which the frame has no field.
+
+    Power that is off and a stop are named too while nobody knows whether motion is possible.
+    """
+    if status.motion_possible is TRUE:
         return ()
+    impossible = status.motion_possible is FALSE
     named = {
         "E_STOPPED": (status.e_stopped is TRUE, "emergency stop"),
         "POWER_OFF": (status.drives_powered is FALSE, "the drives have no power"),
-        "CONTROLLER_ERROR": (status.in_error is TRUE, "the controller is in error"),
+        "CONTROLLER_ERROR": (impossible and status.in_error is TRUE, "the controller is in error"),
     }
     found = {name: text for name, (applies, text) in named.items() if applies}
     since = {one.name: one.since_us for one in before.inhibits}
-    found = found or {"MOTION_NOT_POSSIBLE": "the controller does not say why"}
+    if impossible and not found:
+        found = {"MOTION_NOT_POSSIBLE": "the controller does not say why"}
     return tuple(Inhibit(name, text, since.get(name, unix_us)) for name, text in found.items())
 
 

@@ -13,13 +13,15 @@ from ...interface import HardwareContext, Option, Options, RobotMode
 from ..tcp_arm import TcpArm, Values
 from ..tcp_source import TcpSource
 from .dashboard import Dashboard
-from .rtde import Session
+from .rtde import Session, Step
 from .status import NAMES, Context, Joints, Sample, sample_of, values_of
 
 log = logging.getLogger(__name__)
 
 RATE: Final = 10.0
 """Samples a second."""
+ANSWER: Final = 1.0
+"""Seconds to wait for the version of the controller, which only a person reads."""
 ASSUMED: Final = {"none": RobotMode.UNKNOWN, "auto": RobotMode.AUTO, "manual": RobotMode.MANUAL}
 
 
@@ -44,6 +46,8 @@ class UrRobotHW(TcpArm[Sample]):
         self._name = context.name
         self._session = Session(NAMES, RATE)
         self._dashboard = Dashboard()
+        self._go_on_at = math.inf
+        """When the session goes on without the version of the controller: monotonic seconds."""
         self._missing: tuple[str, ...] = ()
         """The missing values that were last logged."""
         super().__init__(context, options.host, options.port)
@@ -56,8 +60,8 @@ class UrRobotHW(TcpArm[Sample]):
         return [source for source in (self.source, self._dash) if source is not None]
 
     def next_due(self, until: float = -math.inf) -> float:
-        """When a sample is overdue, or a question is due."""
-        due = super().next_due(until)
+        """When a sample is overdue, a question is due, or an answer is not waited for any more."""
+        due = min(super().next_due(until), self._go_on_at)
         if self._dash is not None and self._dash.link.connected:
             due = min(due, self._dashboard.ask_at)
         return due
@@ -67,9 +71,12 @@ class UrRobotHW(TcpArm[Sample]):
         super().write(now)
         if self.source is None or self._dash is None:
             return
+        if now.mono >= self._go_on_at:
+            self._session.go_on()
         if self._session.sent and self.source.link.connected:
             out, self._session.sent = self._session.sent, b""
             self.source.link.send(out)
+            self._go_on_at = now.mono + ANSWER if self._session.step is Step.CONTROLLER else math.inf
         if self._dash.is_new():
             self._dashboard = Dashboard()
         if self._dash.link.connected and (question := self._dashboard.ask(now.mono)):
@@ -77,7 +84,7 @@ class UrRobotHW(TcpArm[Sample]):
 
     def begin(self) -> None:
         """Ask for the values."""
-        self._session = Session(NAMES, RATE)
+        self._session, self._go_on_at = Session(NAMES, RATE), math.inf
 
     def feed(self, data: bytes, now: Instant) -> Sample | None:
         """The last sample in `data`; the speeds of the joints count in each."""

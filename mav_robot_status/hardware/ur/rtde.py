@@ -54,22 +54,27 @@ class Step(Enum):
     """What the client waits for."""
 
     VERSION = "the protocol version"
+    CONTROLLER = "the version of the controller"
     OUTPUTS = "the types of the values"
     START = "the start"
     DATA = "values"
 
 
 class Session:
-    """One connection. `sent` has what to send next; the caller empties it."""
+    """One connection. `sent` has what to send next; the caller empties it.
 
-    def __init__(self, names: Sequence[str], rate: float) -> None:
-        """Ask for the values of these names at `rate` Hz."""
+    It asks one question at a time: a controller may drop what follows a question in the same segment.
+    """
+
+    def __init__(self, names: Sequence[str], rate: float, *, with_firmware: bool = True) -> None:
+        """Ask for the values of these names at `rate` Hz, and before for the version of the controller."""
         self.missing: tuple[str, ...] = ()
         """Names that the controller does not know."""
         self.firmware: str | None = None
         """The version of the controller: `5.11.1`."""
         self.step = Step.VERSION
-        self.sent = frame(VERSION, PROTOCOL.to_bytes(2, "big")) + frame(CONTROLLER)
+        self.sent = frame(VERSION, PROTOCOL.to_bytes(2, "big"))
+        self._with_firmware = with_firmware
         self._names = tuple(names)
         self._rate = rate
         self._recipe: Recipe | None = None
@@ -93,15 +98,25 @@ class Session:
         self._rest = buffer[at:]  # less than one frame
         return found
 
+    def go_on(self) -> None:
+        """Ask for the values, also if the version of the controller did not arrive."""
+        if self.step is Step.CONTROLLER:
+            self._ask()
+
     def _frame(self, kind: int, payload: bytes) -> dict[str, Any] | None:
         if kind == DATA:
             return self._values(payload)
         if kind == CONTROLLER and len(payload) >= FIRMWARE.size:
             self.firmware = "{}.{}.{}".format(*FIRMWARE.unpack_from(payload)[:3])
+            self.go_on()
         elif kind == VERSION and self.step is Step.VERSION:
             if payload[:1] != b"\1":
                 raise ProtocolError(f"the controller does not speak RTDE version {PROTOCOL}: it is too old")
-            self._ask()
+            self.step = Step.CONTROLLER
+            if self._with_firmware:
+                self.sent += frame(CONTROLLER)
+            else:
+                self.go_on()
         elif kind == OUTPUTS and self.step is Step.OUTPUTS:
             self._answered(payload)
         elif kind == START and self.step is Step.START:

@@ -21,21 +21,30 @@ from ...interface import (
     TriState,
     Vehicle,
 )
+from ..join import Logic, join
 from ..tcp_arm import Values
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 
-NAMES: Final = ("robot_mode", "robot_status_bits", "safety_status_bits", "actual_qd")
+NAMES: Final = ("robot_mode", "robot_status_bits", "safety_status_bits", "actual_qd", "safety_status")
 """The values that a status needs."""
 
 POWER_ON, TEACH_BUTTON = 1 << 0, 1 << 2
 """robot_status_bits."""
+NORMAL, REDUCED = 1 << 0, 1 << 1
 PROTECTIVE, SAFEGUARD, SYSTEM_ESTOP, ROBOT_ESTOP, ESTOP, VIOLATION, FAULT, STOPPED = (
     1 << bit for bit in (2, 4, 5, 6, 7, 8, 9, 10)
 )
 """safety_status_bits."""
 EMERGENCY: Final = SYSTEM_ESTOP | ROBOT_ESTOP | ESTOP
 NO_MOTION: Final = PROTECTIVE | SAFEGUARD | EMERGENCY | VIOLATION | FAULT | STOPPED
+MEANINGFUL: Final = (1 << 12) - 1
+"""The bits of safety_status_bits that have a meaning. If none is set, it says nothing."""
+
+MAY_MOVE: Final = frozenset({1, 2})
+"""safety_status: NORMAL, REDUCED."""
+EMERGENCY_STOPS: Final = frozenset({6, 7})
+"""safety_status: SYSTEM_EMERGENCY_STOP, ROBOT_EMERGENCY_STOP."""
 
 MODES: Final = {
     -1: "NO_CONTROLLER",
@@ -107,6 +116,7 @@ class Sample(NamedTuple):
     safety_bits: int | None = None
     joint_speeds: tuple[float, ...] | None = None
     """rad/s."""
+    safety_status: int | None = None
 
 
 def sample_of(values: Mapping[str, Any]) -> Sample:
@@ -150,7 +160,7 @@ class Context(NamedTuple):
 
 def values_of(sample: Sample, context: Context, before: Detail, unix_us: int, at: float) -> Values:
     """The status of an arm. `before` is the previous detail; `at`: when the sample arrived, monotonic seconds."""
-    mode, bits, safety, _ = sample
+    mode, bits, safety = sample[:3]
     stops = [] if safety is None else [row for row in STOPS if safety & row.bits and not safety & row.beside]
     errors = tuple(
         ErrorCause(row.code, row.name, row.text, _since(row.name, before, unix_us)) for row in stops if row.code
@@ -159,11 +169,11 @@ def values_of(sample: Sample, context: Context, before: Detail, unix_us: int, at
     inhibits = () if possible is TRUE else tuple(_inhibits(sample, stops, before, unix_us))
     status = RobotStatus(
         mode=_mode(sample, context),
-        e_stopped=TriState.of(None if safety is None else bool(safety & EMERGENCY)),
+        e_stopped=_e_stopped(sample),
         drives_powered=_powered(mode, bits),
         motion_possible=possible,
         in_motion=context.moving,
-        in_error=TriState.of(None if safety is None else bool(errors)),
+        in_error=TriState.of(None if safety is None or not safety & MEANINGFUL else bool(errors)),
         error_code=errors[0].code if errors else 0,
     )
     state = None if mode is None else MODES.get(mode, str(mode))
@@ -177,23 +187,43 @@ def _mode(sample: Sample, context: Context) -> RobotMode:
     return OPERATIONAL.get(context.operational or "", context.assumed)
 
 
+def _e_stopped(sample: Sample) -> TriState:
+    """FALSE only if the bits say something, and safety_status names no emergency stop beside them."""
+    safety = sample.safety_bits
+    if safety is None or not safety & MEANINGFUL:
+        return UNKNOWN
+    if safety & EMERGENCY:
+        return TRUE
+    return UNKNOWN if sample.safety_status in EMERGENCY_STOPS else FALSE
+
+
 def _powered(mode: int | None, bits: int | None) -> TriState:
+    """UNKNOWN if robot_mode says that there is no power, and the bit that there is."""
     if mode in UNPOWERED:
-        return FALSE
+        return UNKNOWN if bits is not None and bits & POWER_ON else FALSE
     return TriState.of(None if bits is None else bool(bits & POWER_ON))
 
 
 def _motion_possible(sample: Sample) -> TriState:
     """FALSE beats UNKNOWN: without power, with a stop, or in another mode it cannot move."""
-    mode, bits, safety, _ = sample
+    mode, bits = sample.robot_mode, sample.robot_bits
     reasons = (
-        None if mode is None else mode != RUNNING,
-        None if safety is None else bool(safety & NO_MOTION),
-        None if bits is None else not bits & POWER_ON,
+        TriState.of(None if mode is None else mode == RUNNING),
+        _safe(sample),
+        TriState.of(None if bits is None else bool(bits & POWER_ON)),
     )
-    if True in reasons:
+    return join(Logic.ALL, reasons)
+
+
+def _safe(sample: Sample) -> TriState:
+    """Whether the safety system lets it move: it must say so, and contradict itself nowhere."""
+    safety, status = sample.safety_bits, sample.safety_status
+    if safety is None:
+        return UNKNOWN
+    if safety & NO_MOTION:
         return FALSE
-    return UNKNOWN if None in reasons else TRUE
+    agrees = status is None or status in MAY_MOVE
+    return TRUE if agrees and safety & (NORMAL | REDUCED) else UNKNOWN
 
 
 def _inhibits(sample: Sample, stops: list[Stop], before: Detail, unix_us: int) -> list[Inhibit]:
@@ -212,16 +242,18 @@ def _since(name: str, before: Detail, unix_us: int) -> int:
 
 
 def _evidence(sample: Sample, context: Context, at: float) -> dict[str, Evidence]:
-    mode, bits, safety, _ = sample
+    mode, bits, safety = sample[:3]
     in_mode = None if mode is None else f"robot_mode {mode} ({MODES.get(mode, 'unknown')})"
     in_safety = None if safety is None else f"safety_status_bits 0x{safety:03x}"
+    if in_safety is not None and sample.safety_status is not None:
+        in_safety += f", safety_status {sample.safety_status}"
     in_bits = None if bits is None else f"robot_status_bits 0x{bits:x}"
     asked = None if context.operational is None else f"operational mode {context.operational}"
     return {
         "mode": Evidence("teach button, backdrive, else the operational mode of the dashboard", asked or in_bits, at),
-        "e_stopped": Evidence("emergency stop bits", in_safety, at),
-        "drives_powered": Evidence("no power up to POWER_OFF, else the power bit", in_bits or in_mode, at),
-        "motion_possible": Evidence("RUNNING, powered, no stop", in_mode or in_safety, at),
+        "e_stopped": Evidence("emergency stop bits, and no other safety_status beside them", in_safety, at),
+        "drives_powered": Evidence("the power bit; up to POWER_OFF there is no power", in_bits or in_mode, at),
+        "motion_possible": Evidence("RUNNING, powered, NORMAL or REDUCED, no stop", in_mode or in_safety, at),
         "in_motion": Evidence("joint speeds, with hysteresis", "actual_qd", at),
         "in_error": Evidence("protective stop, violation, fault, unexplained safety stop", in_safety, at),
     }

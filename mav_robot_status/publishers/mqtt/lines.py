@@ -41,8 +41,17 @@ def unknown(line: JsonMapping, stamp: str, why: str | None) -> JsonObject:
             "custom_mode": None,
             "state": None,
         },
-        **({"members": members} if isinstance(members, list) else {}),
+        **(_unknown_group(members) if isinstance(members, list) else {}),
         "link": {"state": "LOST" if seen else "NEVER_SEEN", "heartbeat_age": None},
+    }
+
+
+def _unknown_group(members: list[object]) -> JsonObject:
+    """What only a group has: none of its members can be known to be ready."""
+    return {
+        "members": members,
+        "ready": False,
+        "not_ready": [{"handle": member, "why": "LINK_STALE"} for member in members],
     }
 
 

@@ -56,5 +56,11 @@ class Encoder:
         self.uint32(len(items))
         self._data += struct.pack(f"<{len(items)}i", *items)
 
+    def octet_sequence(self, values: Iterable[int]) -> None:
+        """A count, and bytes."""
+        items = bytes(values)
+        self.uint32(len(items))
+        self._data += items
+
     def _align(self, size: int) -> None:
         self._data += bytes(-len(self._data) % size)

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from cyclonedds.idl import make_idl_struct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import byte, int8, int32, sequence, uint32
+from cyclonedds.idl.types import byte, float64, int8, int32, sequence, uint8, uint16, uint32
 
 
 def _struct(package: str, name: str, /, **fields: Any) -> Any:
@@ -30,6 +30,54 @@ _DIAGNOSTIC_STATUS: Final = _struct(
     hardware_id=str,
     values=sequence[_KEY_VALUE],
 )
+_GENERIC: Final = _struct(
+    "control_msgs",
+    "GenericHardwareState",
+    health_status=uint8,
+    error_domain=sequence[uint8],
+    operational_mode=uint8,
+    power_state=uint8,
+    connectivity_status=uint8,
+    manufacturer=str,
+    model=str,
+    firmware_version=str,
+    state_details=sequence[_KEY_VALUE],
+)
+_CANOPEN: Final = _struct(
+    "control_msgs", "CANopenState", node_id=uint8, nmt_state=uint8, dsp_402_state=uint8, last_emcy_code=uint32
+)
+_ETHERCAT: Final = _struct(
+    "control_msgs",
+    "EtherCATState",
+    slave_position=uint16,
+    vendor_id=str,
+    product_code=str,
+    al_state=uint8,
+    has_error=bool,
+    al_status_code=uint16,
+)
+_VDA5050: Final = _struct(
+    "control_msgs",
+    "VDA5050State",
+    order_id=str,
+    action_status=str,
+    last_node_id=uint32,
+    driving=bool,
+    battery_charge=float64,
+    operating_mode=str,
+    error_type=str,
+    error_description=str,
+)
+_DEVICE: Final = _struct(
+    "control_msgs",
+    "HardwareDeviceStatus",
+    header=_HEADER,
+    device_id=str,
+    hardware_status=sequence[_GENERIC],
+    canopen_states=sequence[_CANOPEN],
+    ethercat_states=sequence[_ETHERCAT],
+    vda5050_states=sequence[_VDA5050],
+)
 TYPES: Final[dict[str, Any]] = {
     "RobotStatus": _struct(
         "industrial_msgs",
@@ -45,6 +93,13 @@ TYPES: Final[dict[str, Any]] = {
     ),
     "DiagnosticArray": _struct(
         "diagnostic_msgs", "DiagnosticArray", header=_HEADER, status=sequence[_DIAGNOSTIC_STATUS]
+    ),
+    "HardwareStatus": _struct(
+        "control_msgs",
+        "HardwareStatus",
+        header=_HEADER,
+        hardware_id=str,
+        hardware_device_states=sequence[_DEVICE],
     ),
 }
 """By the name of the message type."""

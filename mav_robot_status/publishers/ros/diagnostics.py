@@ -8,7 +8,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ...interface import FIELDS, STATES, LinkState, TriState
+from ...interface import FIELDS, LinkState, TriState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -44,24 +44,41 @@ def _lost(status: RobotStatus, detail: Detail) -> bool:
     return detail.link is not LinkState.CONNECTED
 
 
-def _unclear(status: RobotStatus, detail: Detail) -> bool:
-    return any(getattr(status, field.name) == TriState.UNKNOWN for field in STATES)
+PARKED: Final = frozenset({"DISARMED", "POWER_OFF", "BRAKES_ENGAGED"})
+"""The inhibits of a robot that nobody wants to move."""
+
+
+def _doubtful(status: RobotStatus, detail: Detail) -> bool:
+    """Whether a person should look. That nobody knows of an emergency stop is no reason: few robots report it."""
+    if TriState.UNKNOWN in (status.motion_possible, status.drives_powered) or detail.ready is False:
+        return True
+    if status.motion_possible is TriState.TRUE:
+        return False
+    parked = {inhibit.name for inhibit in detail.inhibits} <= PARKED and bool(detail.inhibits)
+    return not parked or detail.vehicle.can_arm is False
 
 
 LEVELS: Final[tuple[tuple[Test, Level], ...]] = (
     (_lost, Level.STALE),
-    (lambda status, detail: status.in_error is TriState.TRUE, Level.ERROR),
-    (lambda status, detail: status.motion_possible is not TriState.TRUE, Level.WARN),
-    (_unclear, Level.WARN),
+    (lambda status, detail: TriState.TRUE in (status.e_stopped, status.in_error), Level.ERROR),
+    (_doubtful, Level.WARN),
     (lambda status, detail: True, Level.OK),
 )
-"""The first that applies. UNKNOWN is -1 in a mode as well as in a tri-state."""
+"""The first that applies."""
+
+
+def _is_stopped(status: RobotStatus, detail: Detail) -> bool:
+    """Of a group, whether every member is."""
+    return status.e_stopped is TriState.TRUE and (
+        not detail.members or {one.handle for one in detail.not_ready if one.why == "E_STOPPED"} == set(detail.members)
+    )
+
 
 HEADLINES: Final[tuple[tuple[Test, str], ...]] = (
     (lambda status, detail: detail.link is LinkState.NEVER_SEEN, "NEVER SEEN"),
     (_lost, "NO LINK: its state is unknown, it may move"),
     (lambda status, detail: status.in_motion is TriState.TRUE, "MOVING"),
-    (lambda status, detail: status.e_stopped is TriState.TRUE, "EMERGENCY STOP"),
+    (_is_stopped, "EMERGENCY STOP"),
     (lambda status, detail: status.motion_possible is TriState.TRUE, "MOTION POSSIBLE"),
     (lambda status, detail: status.motion_possible is TriState.FALSE, "MOTION NOT POSSIBLE"),
     (lambda status, detail: True, "UNKNOWN: it may move"),
@@ -80,7 +97,9 @@ def headline(status: RobotStatus, detail: Detail) -> str:
     reasons: tuple[ErrorCause | Inhibit, ...] = () if _lost(status, detail) else detail.errors
     if not (reasons or _lost(status, detail) or status.in_motion is TriState.TRUE):
         reasons = detail.inhibits
-    return f"{words}: {_reason(reasons[0])}" if reasons else words
+    told = f"{words}: {reason_of(reasons[0])}" if reasons else words
+    others = ", ".join(f"{one.handle} ({one.why})" for one in detail.not_ready)
+    return f"{told}; not ready: {others}" if others and not _lost(status, detail) else told
 
 
 def diagnostic_status(msg: RobotStatusMsg) -> DiagnosticStatus:
@@ -94,14 +113,18 @@ def _values(msg: RobotStatusMsg) -> Iterator[tuple[str, str]]:
     for field in FIELDS:
         yield field.name, field.word(getattr(msg.status, field.name))
     for error in msg.detail.errors:
-        yield f"error {error.code}", _reason(error)
+        yield f"error {error.code}", reason_of(error)
     for inhibit in msg.detail.inhibits:
-        yield f"inhibit {inhibit.name}", inhibit.text or ""
+        yield f"inhibit {reason_of(inhibit._replace(text=None))}", inhibit.text or ""
+    for one in msg.detail.not_ready:
+        yield f"not ready {one.handle}", one.why
     yield "link", msg.detail.link.value
     for name, value in msg.detail.vehicle._asdict().items():
         if value is not None:
             yield name, str(value)
 
 
-def _reason(reason: ErrorCause | Inhibit) -> str:
-    return f"{reason.name} ({reason.text})" if reason.text else reason.name
+def reason_of(reason: ErrorCause | Inhibit) -> str:
+    """Its name, with the member of a group in front, and the words of the robot behind."""
+    name = reason.name if reason.handle is None else f"{reason.handle}: {reason.name}"
+    return f"{name} ({reason.text})" if reason.text else name

@@ -12,10 +12,17 @@ from ...interface import FIELDS, Kind
 from ..json_lines import error_codes
 from .cdr import Encoder
 from .diagnostics import diagnostic_status
+from .hardware_status import devices
+from .naming import DIAGNOSTICS
+from .naming import HARDWARE_STATUS as HARDWARE_STATUS_TOPIC
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from ...interface import RobotStatusMsg
     from .diagnostics import DiagnosticStatus
+    from .hardware_status import Device
+    from .settings import Ros2Settings
 
 LAST_SECOND: Final = 2**31 - 1  # builtin_interfaces/msg/Time counts seconds as int32: until 2038
 
@@ -45,9 +52,24 @@ DIAGNOSTIC_ARRAY: Final = MessageType(
     "diagnostic_msgs", "DiagnosticArray", "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"
 )
 
+HARDWARE_STATUS: Final = MessageType(
+    "control_msgs", "HardwareStatus", "RIHS01_d4d081efebdea6d8863855733ea95c58338ac4ffdb501a9524da4cbbad9927a2"
+)
+
+
+def kind_of(topic: str, settings: Ros2Settings) -> MessageType | None:
+    """What the gateway publishes on a topic; None if it publishes nothing there."""
+    if topic == DIAGNOSTICS:
+        return DIAGNOSTIC_ARRAY
+    kinds = {settings.topic: ROBOT_STATUS, HARDWARE_STATUS_TOPIC: HARDWARE_STATUS}
+    return kinds.get(topic.rpartition("/")[2])
+
 
 def robot_status(msg: RobotStatusMsg) -> bytes:
-    """industrial_msgs/msg/RobotStatus. frame_id is the name of the handle."""
+    """industrial_msgs/msg/RobotStatus.
+
+    ORIGINAL: leaves frame_id empty. Here it is the handle, because a gateway has several robots.
+    """
     encoder = Encoder()
     _header(encoder, msg.unix_us, msg.handle)
     for field, value in zip(FIELDS, msg.status, strict=True):
@@ -69,6 +91,33 @@ def diagnostic_array(msg: RobotStatusMsg) -> bytes:
     return encoder.payload()
 
 
+def hardware_status(msg: RobotStatusMsg, latest: Mapping[str, RobotStatusMsg]) -> bytes:
+    """control_msgs/msg/HardwareStatus of a robot, or of a group. `latest` has the messages of its members by handle."""
+    encoder = Encoder()
+    _header(encoder, msg.unix_us, msg.handle)
+    encoder.string(msg.handle)
+    found = devices(msg, latest)
+    encoder.uint32(len(found))
+    for one in found:
+        _device(encoder, one)
+    return encoder.payload()
+
+
+def _device(encoder: Encoder, one: Device) -> None:
+    _header(encoder, one.unix_us, one.device_id)
+    encoder.string(one.device_id)
+    encoder.uint32(1)  # its GenericHardwareState
+    encoder.octet(one.health_status)
+    encoder.octet_sequence(one.error_domain)
+    for number in (one.operational_mode, one.power_state, one.connectivity_status):
+        encoder.octet(number)
+    for text in (one.manufacturer, one.model, one.firmware_version):
+        encoder.string(text)
+    _key_values(encoder, one.state_details)
+    for _ in ("canopen_states", "ethercat_states", "vda5050_states"):
+        encoder.uint32(0)
+
+
 def _header(encoder: Encoder, unix_us: int, frame_id: str) -> None:
     """std_msgs/msg/Header. A time that int32 seconds cannot express becomes the nearest one that they can."""
     seconds, us = divmod(unix_us, 1_000_000)
@@ -82,7 +131,11 @@ def _diagnostic_status(encoder: Encoder, status: DiagnosticStatus) -> None:
     encoder.string(status.name)
     encoder.string(status.message)
     encoder.string(status.hardware_id)
-    encoder.uint32(len(status.values))
-    for key, value in status.values:
+    _key_values(encoder, status.values)
+
+
+def _key_values(encoder: Encoder, values: Sequence[tuple[str, str]]) -> None:
+    encoder.uint32(len(values))
+    for key, value in values:
         encoder.string(key)
         encoder.string(value)

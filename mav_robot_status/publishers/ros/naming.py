@@ -16,6 +16,7 @@ log = logging.getLogger(__name__)
 
 DIAGNOSTICS: Final = "/diagnostics"
 """The topic that every diagnostics tool reads. It is the same for all handles, and not in our namespace."""
+HARDWARE_STATUS: Final = "hardware_status"
 LONGEST: Final = 100  # characters of a cleaned name; DDS allows 256 for the whole topic
 _OTHER: Final = re.compile(r"[^A-Za-z0-9]+")
 _NAME: Final = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*")
@@ -56,6 +57,11 @@ class Topics:
 
     def _join(self, part: str) -> str:
         return "/".join([self._namespace, *([part] if part else []), self._topic])
+
+
+def beside(topic: str) -> str:
+    """The topic of control_msgs/HardwareStatus beside that of the status: `/rover/hardware_status`."""
+    return f"{topic.rpartition('/')[0]}/{HARDWARE_STATUS}"
 
 
 def clean(name: str) -> str:

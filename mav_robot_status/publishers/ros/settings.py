@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 from ...errors import UsageError
 from ...interface.options import Option, Options, short
-from .naming import DIAGNOSTICS, is_name
+from .naming import DIAGNOSTICS, HARDWARE_STATUS, is_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,6 +20,11 @@ LAST_DOMAIN: Final = 232
 """The ports of a higher DDS domain would exceed 65535."""
 DOMAIN: Final = "ROS_DOMAIN_ID"
 """The environment variable with the domain that every ROS 2 program uses."""
+RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+RANGES: Final = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+LOCALHOST_ONLY: Final = "ROS_LOCALHOST_ONLY"
+"""Older than RANGE, and goes before it."""
+PEERS: Final = "ROS_STATIC_PEERS"
 FORMS: Final = "write zenoh://127.0.0.1:7447 for a Zenoh router, or dds://0 for the DDS domain 0"
 
 
@@ -33,6 +38,7 @@ class Ros2Options(Options):
     namespace: Annotated[str, Option("namespace of the ROS 2 topics and node", "--ros2-namespace", "NAME")] = ""
     topic: Annotated[str, Option("name of the topic of each robot")] = "robot_status"
     rate: Annotated[float, Option("messages a second on each topic if nothing changes, Hz", low=0, high=1000)] = 1.0
+    hardware_status: Annotated[bool, Option("publish control_msgs/HardwareStatus too, for ros2_control")] = False
 
 
 class Ros2Settings(NamedTuple):
@@ -49,12 +55,18 @@ class Ros2Settings(NamedTuple):
     topic: str = "robot_status"
     rate: float = 1.0
     """Hz; 0: changes only."""
+    hardware_status: bool = False
+    """Whether control_msgs/HardwareStatus is published too."""
+    local: bool = False
+    """DDS on this computer only."""
+    peers: tuple[str, ...] = ()
+    """DDS: computers that are asked besides those that multicast finds."""
 
     @property
     def name(self) -> str:
         """The other end in log messages."""
         if self.middleware == DDS:
-            return f"DDS domain {self.domain}"
+            return f"DDS domain {self.domain}" + (" (LOCALHOST)" if self.local else "")
         host = f"[{self.host}]" if ":" in self.host else self.host
         domain = f", domain {self.domain}" if self.domain else ""
         return f"Zenoh router {host}:{self.port}{domain}"
@@ -64,7 +76,9 @@ def read(given: Mapping[str, object], environment: Mapping[str, str] = os.enviro
     """The settings of a publisher's mapping. Raises UsageError for a wrong option."""
     options = Ros2Options.read("ros2", given)
     settings = read_url(options.url, environment)
-    return settings._replace(namespace=_namespace(options.namespace), topic=_topic(options), rate=options.rate)
+    return settings._replace(namespace=_namespace(options.namespace), topic=_topic(options))._replace(
+        rate=options.rate, hardware_status=options.hardware_status
+    )
 
 
 def read_url(url: str, environment: Mapping[str, str] = os.environ) -> Ros2Settings:
@@ -80,7 +94,8 @@ def read_url(url: str, environment: Mapping[str, str] = os.environ) -> Ros2Setti
     if parts.scheme == ZENOH and host:
         return Ros2Settings(ZENOH, _domain(rest, url, environment), host, DEFAULT_PORT if port is None else port)
     if parts.scheme == DDS and not rest:
-        return Ros2Settings(DDS, _domain(parts.netloc, url, environment))
+        domain, (local, peers) = _domain(parts.netloc, url, environment), _discovery(environment)
+        return Ros2Settings(DDS, domain, local=local, peers=peers)
     raise UsageError(f"ros2: {short(url, 200)} is not an address; {FORMS}")
 
 
@@ -91,6 +106,18 @@ def _domain(text: str, url: str, environment: Mapping[str, str]) -> int:
         return int(given)
     where = short(url, 200) if text else f"{DOMAIN} in the environment"
     raise UsageError(f"ros2: {where}: the domain must be a number from 0 to {LAST_DOMAIN}, not {short(given)}")
+
+
+def _discovery(environment: Mapping[str, str]) -> tuple[bool, tuple[str, ...]]:
+    """Whether DDS stays on this computer, and its static peers, as every ROS 2 program reads them."""
+    if environment.get(LOCALHOST_ONLY) == "1":
+        return True, ()
+    found = environment.get(RANGE, "")
+    if found == "OFF":
+        raise UsageError(f"ros2: {RANGE} is OFF: no subscriber could hear the gateway; write LOCALHOST or SUBNET")
+    if found not in ("", *RANGES):
+        raise UsageError(f"ros2: {RANGE} must be one of {', '.join(RANGES)}, not {short(found)}")
+    return found == "LOCALHOST", tuple(peer for peer in environment.get(PEERS, "").split(";") if peer)
 
 
 def _namespace(text: str) -> str:
@@ -104,6 +131,8 @@ def _namespace(text: str) -> str:
 
 
 def _topic(options: Ros2Options) -> str:
+    if options.hardware_status and options.topic == HARDWARE_STATUS:
+        raise UsageError(f"ros2: topic: {HARDWARE_STATUS} is that of control_msgs/HardwareStatus; write robot_status")
     if not is_name(options.topic) or len(options.topic) > 100 or f"/{options.topic}" == DIAGNOSTICS:
         raise UsageError(
             f"ros2: topic: ROS does not allow {short(options.topic)} here; write a letter, then letters, digits and "

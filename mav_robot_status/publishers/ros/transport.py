@@ -34,6 +34,10 @@ class Endpoint(NamedTuple):
     dds_type: str
     type_hash: str
     """Empty if the middleware does not say it."""
+    matched: bool | None = None
+    """Whether our writers match it; None if the middleware does not say it, or the topic is none of ours."""
+    why: str = ""
+    """Why it does not match."""
 
 
 class Transport(Protocol):

@@ -8,10 +8,17 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from ...interface import Inhibit, LinkState, RobotStatus, RobotStatusMsg
+from ...interface import Inhibit, RobotStatus, RobotStatusMsg
 from ..error_reporter import ErrorReporter
-from .messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS, diagnostic_array, robot_status
-from .naming import DIAGNOSTICS, Topics
+from .messages import (
+    DIAGNOSTIC_ARRAY,
+    HARDWARE_STATUS,
+    ROBOT_STATUS,
+    diagnostic_array,
+    hardware_status,
+    robot_status,
+)
+from .naming import DIAGNOSTICS, Topics, beside
 from .transport import Sample, UnreachableError
 
 if TYPE_CHECKING:
@@ -46,6 +53,7 @@ class Worker:
         self._transport, self._clock = transport, clock
         self._errors = ErrorReporter("ros2", settings.name)
         self._topics = Topics(settings.namespace, settings.topic)
+        self._with_hardware_status = settings.hardware_status
         self._changed = threading.Condition()
         self._queue: deque[RobotStatusMsg | Gone] = deque()
         self._full = self._stop = False
@@ -186,10 +194,14 @@ class Worker:
 
     def _samples(self, msg: RobotStatusMsg) -> tuple[Sample, ...]:
         ns = msg.unix_us * 1000
-        return (
-            Sample(self._topics.of(msg.handle), ROBOT_STATUS, robot_status(msg), ns),
+        topic = self._topics.of(msg.handle)
+        samples = (
+            Sample(topic, ROBOT_STATUS, robot_status(msg), ns),
             Sample(DIAGNOSTICS, DIAGNOSTIC_ARRAY, diagnostic_array(msg), ns),
         )
+        if not self._with_hardware_status:
+            return samples
+        return (*samples, Sample(beside(topic), HARDWARE_STATUS, hardware_status(msg, self._latest), ns))
 
     def _forget(self, handle: str) -> None:
         self._latest.pop(handle, None)
@@ -199,6 +211,8 @@ class Worker:
             return
         try:
             self._transport.remove(topic)
+            if self._with_hardware_status:
+                self._transport.remove(beside(topic))
         except UnreachableError as error:
             self._lose(str(error))
 
@@ -206,14 +220,13 @@ class Worker:
         """Publish the remaining messages, then unknown statuses: ROS keeps no last message for others."""
         self._serve(self._take())
         now = self._clock()
-        for msg in list(self._latest.values()):
-            self._send(unknown(msg, now))
+        self._latest = {handle: unknown(msg, now) for handle, msg in self._latest.items()}
+        for msg in self._latest.values():
+            self._send(msg)
         self._transport.close()
 
 
 def unknown(msg: RobotStatusMsg, now: Instant) -> RobotStatusMsg:
     """The last message of a handle: the gateway stops, so nothing is known of the robot."""
     why = Inhibit("LINK_STALE", "the gateway has stopped", now.unix_us)
-    vehicle = msg.detail.vehicle._replace(flight_mode=None, custom_mode=None, state=None)
-    detail = msg.detail._replace(errors=(), inhibits=(why,), vehicle=vehicle, link=LinkState.LOST)
-    return RobotStatusMsg(msg.handle, now.unix_us, RobotStatus(), detail, None)
+    return RobotStatusMsg(msg.handle, now.unix_us, RobotStatus(), msg.detail.lost(why), None)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Final
 
 from ...clock import Instant
-from ...interface import Publisher, PublisherContext, RobotStatusMsg
+from ...interface import Publisher, PublisherContext, RobotStatus, RobotStatusMsg
 from ...simple_message import StatusEncoder
 from ..listener import listen
 from .options import NAME, SimpleMessageOptions, read
@@ -66,5 +66,6 @@ class SimpleMessagePublisher(Publisher):
         self._latest = b""
 
     def close(self) -> None:
-        """Close the port and all connections."""
+        """Tell every client that nothing is known any more; close the port and all connections."""
+        self._server.send(self._encoder.encode(RobotStatus()))
         self._server.close()

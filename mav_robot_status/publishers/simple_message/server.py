@@ -34,6 +34,7 @@ SOCKET_OPTIONS: Final = (
     (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 10),
     (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 5),
     (socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 2),
+    (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 20_000),  # ms; while frames wait, there are no keepalives
 )
 RESET: Final = struct.pack("ii", 1, 0)
 """SO_LINGER: close at once, and discard what waits."""
@@ -150,6 +151,8 @@ class Server:
         self._tell(logging.INFO, self._now, f"{self._text}: {client.where} is gone: {why.lower()}")
 
     def _forget(self, client: Client) -> None:
+        with suppress(OSError):  # bytes that nobody has read would turn the end into a reset, which discards frames
+            client.socket.recv(CHUNK)
         self._poll.unregister(client.socket)
         del self._clients[client.socket.fileno()]
         client.socket.close()

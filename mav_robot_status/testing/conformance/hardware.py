@@ -24,7 +24,7 @@ import pytest
 
 from ...clock import Instant, later
 from ...interface import Evidence, HardwareInterface, IndustrialRobotStatusHandle, LinkState, RobotStatus
-from ...interface.validation import validate
+from ...interface.validation import assumptions, validate
 
 START: Final = Instant(1000.0, 1_800_000_000_000_000)
 LIMIT: Final = 64
@@ -58,7 +58,7 @@ class Driver:
     def __init__(self, hardware: HardwareInterface) -> None:
         self.hardware = hardware
         self.now = START
-        self.stops_cut_power = bool(getattr(hardware, "stops_cut_power", True))
+        self.assumptions = assumptions(hardware)
 
     def turn(self, seconds: float = 0.0) -> None:
         """Advance the time, then do everything that a turn of the gateway does."""
@@ -98,9 +98,8 @@ class Driver:
     def check(self) -> None:
         """Assert that every handle holds a valid status."""
         for handle in self.hardware.handles:
-            assert (broken := validate(handle.status, handle.detail, stops_cut_power=self.stops_cut_power)) is None, (
-                f"{handle.name}: {broken}"
-            )
+            broken = validate(handle.status, handle.detail, **self.assumptions)
+            assert broken is None, f"{handle.name}: {broken}"
 
 
 class HardwareConformance:

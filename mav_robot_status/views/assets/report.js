@@ -21,7 +21,8 @@ for (const name of new Set(DATA.logs.flatMap((log) => log.vehicles.flatMap(({ tr
 const lookOf = (track, value) => DATA.looks[track] && DATA.looks[track][value];
 const isState = (track) => lookOf(track, "TRUE") !== undefined;
 const FORMS = { full: [TOP, BODY], half: [TOP + BODY - 6, 6], line: [TOP + BODY - 3, 3], hatched: [TOP, BODY] };
-const KINDS = [["error", "Error causes"], ["inhibit", "Why motion is not possible"], ["unknown", "Why this is unknown"]];
+const KINDS = [["error", "Error causes"], ["inhibit", "Why motion is not possible"], ["unknown", "Why this is unknown"],
+  ["not_ready", "Members that could not work"]];
 const MORE = 1000; // rows that the table of changes adds at once
 const MOST_CYCLES = 50; // arm cycles listed
 

@@ -267,7 +267,7 @@ one: {type: mav_robot_status/IndustrialRobotStatusController, handle_name: a, pu
 two:
   type: mav_robot_status/IndustrialRobotStatusController
   handle_name: b
-  publish_rate: 0
+  publish_rate: -1
   publish_on_change: false
 three: {type: theirs/Controller, colour: red}
 """

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import itertools
+import json
 from typing import Any, Final
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_robot_status.hardware.group import GROUP, RULES, Combined, Group, Member, Rule, combine, last_heard
+from mav_robot_status.hardware.group import RULES, Combined, Group, Member, Rule, combine, last_heard
 from mav_robot_status.hardware.join import Logic
 from mav_robot_status.interface import (
+    GROUP,
     Detail,
     ErrorCause,
     Evidence,
     Inhibit,
     LinkState,
+    NotReady,
     RobotMode,
     RobotStatus,
     TriState,
     validate,
 )
+from mav_robot_status.language import headline
+from mav_robot_status.publishers.json_lines import native_body
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 MANUAL, AUTO = RobotMode.MANUAL, RobotMode.AUTO
@@ -225,3 +230,55 @@ def test_what_a_group_knows_no_unknown_member_can_refute(found: list[Member]) ->
             before = getattr(known, field)
             if before.name != "UNKNOWN" and field != "mode":
                 assert getattr(after, field) is before
+
+
+def parts(link: LinkState = LinkState.CONNECTED, *, errors: str = "", inhibits: str = "") -> Detail:
+    causes = tuple(ErrorCause(1, name, None, 1) for name in errors.split())
+    return Detail(errors=causes, inhibits=tuple(Inhibit(name, None, 1) for name in inhibits.split()), link=link)
+
+
+CAN = RobotStatus(e_stopped=FALSE, drives_powered=TRUE, motion_possible=TRUE, in_error=FALSE)
+CANNOT = CAN._replace(motion_possible=FALSE)
+
+
+@pytest.mark.parametrize(
+    ("status", "detail", "why"),
+    [
+        (CAN, parts(), None),
+        (CAN._replace(e_stopped=UNKNOWN, in_error=UNKNOWN), parts(), None),
+        (RobotStatus(), parts(LinkState.LOST, inhibits="LINK_STALE"), "LINK_STALE"),
+        (RobotStatus(), parts(LinkState.NEVER_SEEN), "LINK_STALE"),
+        (CANNOT._replace(e_stopped=TRUE, in_error=TRUE), parts(errors="CRASHED", inhibits="DISARMED"), "E_STOPPED"),
+        (CAN._replace(in_error=TRUE), parts(errors="RADIO_FAILSAFE BATTERY_LOW"), "RADIO_FAILSAFE"),
+        (CANNOT._replace(in_error=TRUE), parts(errors="CRASHED", inhibits="DISARMED"), "CRASHED"),
+        (CANNOT, parts(inhibits="DISARMED PREARM_FAILING"), "DISARMED"),
+        (CANNOT, parts(), "MOTION_NOT_POSSIBLE"),
+        (CAN._replace(motion_possible=UNKNOWN), parts(inhibits="STOP_UNCERTAIN"), "STOP_UNCERTAIN"),
+        (CAN._replace(motion_possible=UNKNOWN), parts(), "MOTION_UNKNOWN"),
+    ],
+)
+def test_a_member_is_ready_or_says_why_not(status: RobotStatus, detail: Detail, why: str | None) -> None:
+    group = combine(ROBOT, [member("base", CAN), member("arm", status, detail)], Detail(), NOW).detail
+    assert group.not_ready == (() if why is None else (NotReady("arm", why),))
+    assert group.ready is (why is None)
+
+
+def test_a_group_without_members_is_not_ready_and_a_single_robot_is_neither() -> None:
+    assert of().detail.ready is False
+    assert Detail().ready is None
+
+
+@given(st.lists(members(), min_size=1, max_size=4, unique_by=lambda one: one.name))
+def test_no_group_says_safe_while_a_member_that_is_heard_can_move(found: list[Member]) -> None:
+    status, detail, _ = combine(ROBOT, found, Detail(), NOW)
+    line = json.loads("{" + native_body("robot", status, detail) + "}}")
+    for one in found:
+        if TRUE in (one.status.motion_possible, one.status.drives_powered, one.status.in_motion):
+            for field in ("motion_possible", "drives_powered", "in_motion"):
+                assert getattr(status, field) is TRUE or getattr(one.status, field) is not TRUE
+            assert status.e_stopped is not TRUE or one.status.e_stopped is TRUE
+        if one.status.motion_possible is TRUE:
+            assert headline(line).word not in ("EMERGENCY STOP", "READY", "PARKED", "CANNOT ARM")
+            assert not detail.inhibits
+    everybody = all(one.status.motion_possible is TRUE and one.status.in_error is not TRUE for one in found)
+    assert detail.ready is everybody

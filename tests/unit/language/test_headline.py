@@ -111,6 +111,20 @@ def test_a_stop_of_one_member_is_never_that_of_the_group() -> None:
     assert headline({**whole, "drives_powered": True}).word != "EMERGENCY STOP"
 
 
+def test_a_group_whose_members_are_not_here_says_what_its_line_says_of_them() -> None:
+    whole = {**LIVE, "members": ["base", "arm"], "e_stopped": None, "ready": False}
+    found = headline(line(**whole, not_ready=[{"handle": "base", "why": "E_STOPPED"}]))
+    assert found.sentences[0].text == "base is stopped; arm is READY and may move"
+    assert (found.word, found.tone) == ("ARMED", "alarm")
+    reasons = ("DISARMED", "MOTION_UNKNOWN", "BATTERY_LOW", "LINK_STALE")
+    not_ready = [{"handle": name, "why": why} for name, why in zip("abcd", reasons, strict=True)]
+    found = headline(line(**LIVE, members=list("abcde"), ready=False, not_ready=not_ready))
+    assert found.sentences[0].text == (
+        "a is not ready: it is disarmed; b is UNKNOWN and may move; c is not ready: the battery is low; "
+        "d is LOST and may move; e is READY and may move"
+    )
+
+
 def test_of_a_moving_robot_nothing_says_that_it_cannot_move() -> None:
     assert spoken(headline(line(in_motion=True))).startswith("It ignores motion commands: it is disarmed.")
 

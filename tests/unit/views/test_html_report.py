@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mav_robot_status.errors import LinkError, UsageError
-from mav_robot_status.interface import TRI_STATES, Evidence, Inhibit
+from mav_robot_status.interface import TRI_STATES, Evidence, Inhibit, NotReady
 from mav_robot_status.language import LOOKS
 from mav_robot_status.views.html_report import as_html, as_json, embedded, save
 
@@ -52,6 +52,25 @@ def test_an_interval_has_its_times_and_its_evidence() -> None:
             "source": "EXTENDED_SYS_STATE",
         }
     ]
+
+
+def test_a_group_lists_the_members_that_could_not_work_while_another_one_could() -> None:
+    flight = Flight()
+    flight.detail = flight.detail._replace(component=192, members=("base", "arm"))
+    flight.say(0, motion_possible=TRUE)
+    flight.detail = flight.detail._replace(not_ready=(NotReady("arm", "E_STOPPED"),))
+    flight.say(1, motion_possible=TRUE)
+    flight.detail = flight.detail._replace(not_ready=())
+    found = told(flight.say(3, motion_possible=TRUE), 4)
+    assert [(one["handle"], one["name"], one["seconds"]) for one in found["intervals"]["not_ready"]] == [
+        ("arm", "E_STOPPED", 2.0)
+    ]
+    assert found["totals"]["not_ready"][0]["seconds"] == 2.0
+    assert "not_ready" not in told(Flight().say(0), 1)["totals"]
+    (vehicle,) = data_of(as_html([flight.builder.timeline], "me"))["logs"][0]["vehicles"]
+    assert list(vehicle["inhibits"]) == ["not ready: arm: E_STOPPED"]
+    (total,) = vehicle["totals"]["inhibits"]
+    assert (total["name"], total["kind"]) == ("not ready: arm: E_STOPPED", "not_ready")
 
 
 def test_a_group_names_its_members_and_who_reports_a_reason() -> None:

@@ -34,7 +34,7 @@ def test_a_value_out_of_its_range_is_unknown(name: str) -> None:
         ({"drives_powered": 0}, FALSE, UNKNOWN, UNKNOWN),  # without power, and able to move
         ({"e_stopped": 1}, UNKNOWN, TRUE, UNKNOWN),
         ({"e_stopped": 1, "drives_powered": 0}, UNKNOWN, UNKNOWN, UNKNOWN),
-        ({"drives_powered": 0, "motion_possible": -1}, FALSE, FALSE, FALSE),
+        ({"drives_powered": 0, "motion_possible": -1}, FALSE, FALSE, UNKNOWN),  # by its definition it needs no power
         ({"e_stopped": 1, "motion_possible": 0}, TRUE, TRUE, FALSE),
     ],
 )
@@ -77,5 +77,15 @@ def test_the_evidence_is_the_number_of_the_frame() -> None:
 @given(st.builds(StatusFrame, *[NUMBERS] * 7))
 def test_every_frame_makes_a_valid_status(frame: StatusFrame) -> None:
     status, detail, _ = values_of(frame, Detail(), 5, 1.0)
-    assert validate(status, detail, stops_cut_power=False) is None
-    assert bool(detail.inhibits) is (status.motion_possible is FALSE)
+    assert validate(status, detail, stops_cut_power=False, motion_needs_power=False) is None
+    assert detail.inhibits or status.motion_possible is not FALSE
+    assert not detail.inhibits or status.motion_possible is not TRUE
+
+
+@pytest.mark.parametrize(
+    ("powered", "stopped", "names"), [(0, 0, ["POWER_OFF"]), (1, 1, ["E_STOPPED"]), (0, 1, ["E_STOPPED", "POWER_OFF"])]
+)
+def test_what_is_off_or_stopped_is_named_while_motion_is_unknown(powered: int, stopped: int, names: list[str]) -> None:
+    frame = RUNNING._replace(drives_powered=powered, e_stopped=stopped, motion_possible=-1, in_error=1)
+    status, detail, _ = values_of(frame, Detail(), 5, 1.0)
+    assert (status.motion_possible, [one.name for one in detail.inhibits]) == (UNKNOWN, names)

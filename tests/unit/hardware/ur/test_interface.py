@@ -11,7 +11,7 @@ import pytest
 from mav_robot_status.clock import later
 from mav_robot_status.errors import UsageError
 from mav_robot_status.hardware.tcp_arm import SILENCE
-from mav_robot_status.hardware.ur.interface import UrRobotHW
+from mav_robot_status.hardware.ur.interface import ANSWER, UrRobotHW
 from mav_robot_status.hardware.ur.rtde import LONGEST
 from mav_robot_status.interface import HardwareContext, HardwareInterface, LinkState, RobotMode, RobotStatus, TriState
 from mav_robot_status.testing.conformance.hardware import Driver, HardwareConformance, Robot
@@ -95,7 +95,7 @@ def test_a_controller_that_falls_silent_is_lost_and_comes_back(driver: Driver, c
 def test_a_controller_that_reboots_is_asked_again(driver: Driver, controller: Controller) -> None:
     wait_for(driver, lambda s: s.drives_powered is TriState.TRUE)
     controller.arm.drop_clients()
-    controller.arm.robot_mode = 2
+    controller.arm.robot_mode, controller.arm.robot_bits = 2, 0
     wait_for(driver, lambda s: s.drives_powered is TriState.FALSE)
 
 
@@ -130,6 +130,24 @@ def test_a_controller_that_does_not_know_a_value_leaves_its_field_unknown(
     status = wait_for(driver, lambda s: s.drives_powered is TriState.TRUE)
     assert (status.e_stopped, status.motion_possible, status.in_error) == (-1, -1, -1)
     assert caplog.text.count("arm: the controller does not know safety_status_bits") == 1
+
+
+def test_a_controller_that_drops_what_follows_a_question_is_heard(driver: Driver, controller: Controller) -> None:
+    controller.arm.drops_what_follows = True
+    wait_for(driver, lambda s: s.drives_powered is TriState.TRUE)
+    (handle,) = driver.hardware.handles
+    assert handle.detail.vehicle.firmware == "5.11.1"
+
+
+def test_a_controller_that_does_not_tell_its_version_is_heard_after_a_second(
+    driver: Driver, controller: Controller
+) -> None:
+    controller.arm.tells_version = False
+    began = driver.now.mono
+    wait_for(driver, lambda s: s.drives_powered is TriState.TRUE)
+    assert ANSWER <= driver.now.mono - began < SILENCE
+    (handle,) = driver.hardware.handles
+    assert handle.detail.vehicle.firmware is None
 
 
 def test_an_old_controller_gets_one_line(

@@ -44,16 +44,41 @@ def test_a_running_arm_can_move() -> None:
         (10, FALSE, 8004, "SAFETY_STOP"),
     ],
 )
-def test_each_safety_bit_stops_the_arm(bit: int, e_stopped: TriState, code: int, name: str) -> None:
+def test_each_stop_of_the_safety_bits_stops_the_arm(bit: int, e_stopped: TriState, code: int, name: str) -> None:
     status, detail, _ = of(RUNNING._replace(safety_bits=1 << bit))
     assert (status.e_stopped, status.motion_possible) == (e_stopped, FALSE)
     assert (status.in_error, status.error_code) == (TriState.of(code != 0), code)
     assert [inhibit.name for inhibit in detail.inhibits] == [name]
 
 
-@pytest.mark.parametrize("bit", [0, 1, 3, 11])
-def test_the_other_safety_bits_stop_nothing(bit: int) -> None:
-    assert of(RUNNING._replace(safety_bits=1 << bit)).status.motion_possible is TRUE
+@pytest.mark.parametrize(
+    ("safety", "expected"),
+    [(0, UNKNOWN), (0b1, TRUE), (0b10, TRUE), (0b1001, TRUE), (0x8, UNKNOWN), (0x800, UNKNOWN), (0x1000, UNKNOWN)],
+)
+def test_it_can_move_only_if_the_safety_system_says_normal_or_reduced(safety: int, expected: TriState) -> None:
+    status, detail, _ = of(RUNNING._replace(safety_bits=safety))
+    assert (status.motion_possible, detail.inhibits) == (expected, ())
+
+
+@pytest.mark.parametrize("safety", [0, 0x1000])
+def test_safety_bits_that_say_nothing_rule_out_no_stop_and_no_error(safety: int) -> None:
+    status = of(RUNNING._replace(safety_bits=safety)).status
+    assert (status.e_stopped, status.in_error) == (UNKNOWN, UNKNOWN)
+
+
+@pytest.mark.parametrize("safety_status", [None, *range(1, 14)])
+def test_a_safety_status_that_contradicts_the_bits_makes_them_doubtful(safety_status: int | None) -> None:
+    status = of(RUNNING._replace(safety_status=safety_status)).status
+    assert status.motion_possible is (TRUE if safety_status in (None, 1, 2) else UNKNOWN)
+    assert status.e_stopped is (UNKNOWN if safety_status in (6, 7) else FALSE)
+    assert of(RUNNING._replace(safety_status=safety_status, safety_bits=1 << 7)).status.e_stopped is TRUE
+
+
+@pytest.mark.parametrize("mode", [0, 1, 2, 3])
+def test_a_power_bit_that_contradicts_the_robot_mode_makes_the_power_unknown(mode: int) -> None:
+    on, off, untold = (of(RUNNING._replace(robot_mode=mode, robot_bits=bits)).status for bits in (0b1, 0b10, None))
+    assert (on.drives_powered, off.drives_powered, untold.drives_powered) == (UNKNOWN, FALSE, FALSE)
+    assert {on.motion_possible, off.motion_possible, untold.motion_possible} == {FALSE}
 
 
 @pytest.mark.parametrize("bit", [2, 4, 5, 6, 7, 8, 9])
@@ -68,7 +93,7 @@ def test_each_robot_mode_but_running_is_an_inhibit(mode: int) -> None:
     assert detail.vehicle.state == MODES[mode]
     assert status.motion_possible is TriState.of(mode == 7)
     assert bool(detail.inhibits) is (mode != 7)
-    assert status.drives_powered is TriState.of(mode not in (0, 1, 2, 3))
+    assert status.drives_powered is (UNKNOWN if mode in (0, 1, 2, 3) else TRUE)
 
 
 @pytest.mark.parametrize("mode", [POWER_ON, IDLE])
@@ -157,14 +182,20 @@ def test_joint_speeds_that_are_not_numbers_end_what_was_known(speeds: tuple[floa
     assert joints.heard((0.5,), 3) is UNKNOWN
 
 
-optional_bits = st.none() | st.integers(0, 0xFFF)
+optional_bits = st.none() | st.integers(0, 0x1FFF)
 
 
-@given(st.none() | st.integers(-2, 9), optional_bits, optional_bits, st.sampled_from(TriState))
+@given(
+    st.none() | st.integers(-2, 9),
+    optional_bits,
+    optional_bits,
+    st.none() | st.integers(0, 14),
+    st.sampled_from(TriState),
+)
 def test_every_status_of_an_arm_is_valid(
-    mode: int | None, bits: int | None, safety: int | None, moving: TriState
+    mode: int | None, bits: int | None, safety: int | None, safety_status: int | None, moving: TriState
 ) -> None:
-    status, detail, evidence = of(Sample(mode, bits, safety), ANY._replace(moving=moving))
+    status, detail, evidence = of(Sample(mode, bits, safety, None, safety_status), ANY._replace(moving=moving))
     assert validate(status, detail, stops_cut_power=False) is None
     if status.motion_possible is FALSE:
         assert detail.inhibits
@@ -175,4 +206,5 @@ def test_no_combination_of_stops_lets_the_arm_move() -> None:
     for one, other in product(range(12), repeat=2):
         safety = 1 << one | 1 << other
         stops = {one, other} & {2, 4, 5, 6, 7, 8, 9, 10}
-        assert of(RUNNING._replace(safety_bits=safety)).status.motion_possible is TriState.of(not stops)
+        expected = FALSE if stops else TRUE if {one, other} & {0, 1} else UNKNOWN
+        assert of(RUNNING._replace(safety_bits=safety)).status.motion_possible is expected

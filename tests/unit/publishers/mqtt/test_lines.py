@@ -6,6 +6,7 @@ from mav_robot_status.interface import (
     Detail,
     ErrorCause,
     LinkState,
+    NotReady,
     RobotMode,
     RobotStatus,
     RobotStatusMsg,
@@ -37,6 +38,16 @@ def test_an_event_has_an_id_and_the_changed_members_only() -> None:
     assert event["changed"]["errors"]["old"] == []
 
 
+def test_a_member_of_a_group_that_is_not_ready_any_more_is_an_event() -> None:
+    ready = MSG._replace(detail=MSG.detail._replace(members=("base", "arm")))
+    stopped = ready._replace(detail=ready.detail._replace(not_ready=(NotReady("arm", "E_STOPPED"),)))
+    changed = event_of(stopped, members_of(ready), members_of(stopped), "robot", "abcd", 1)["changed"]
+    assert changed == {
+        "ready": {"old": True, "new": False},
+        "not_ready": {"old": [], "new": [{"handle": "arm", "why": "E_STOPPED"}]},
+    }
+
+
 def test_the_first_event_has_all_members() -> None:
     changed = event_of(MSG, {}, NEW, "r1", "abcd", 1)["changed"]
     assert {change["old"] for change in changed.values()} == {None}
@@ -53,6 +64,8 @@ def test_a_robot_without_a_live_status_keeps_only_its_identity() -> None:
 
 def test_a_group_without_a_live_status_keeps_its_members() -> None:
     group = MSG._replace(detail=MSG.detail._replace(members=("base", "arm")))
-    assert unknown(json.loads(line_of(group, 4)), "now", "why")["members"] == ["base", "arm"]
+    left = unknown(json.loads(line_of(group, 4)), "now", "why")
+    assert (left["members"], left["ready"]) == (["base", "arm"], False)
+    assert left["not_ready"] == [{"handle": "base", "why": "LINK_STALE"}, {"handle": "arm", "why": "LINK_STALE"}]
     for other in ({}, {"members": 7}, json.loads(line_of(MSG, 4))):
         assert "members" not in unknown(other, "now", "why")

@@ -9,6 +9,7 @@ from mav_robot_status.interface import (
     ErrorCause,
     Inhibit,
     LinkState,
+    NotReady,
     RobotMode,
     RobotStatus,
     RobotStatusMsg,
@@ -38,6 +39,8 @@ _details = st.builds(
     inhibits=st.lists(st.builds(Inhibit, _text, st.none() | _text, st.just(0)), max_size=4).map(tuple),
     vehicle=st.builds(Vehicle, flight_mode=st.none() | _text),
     link=st.sampled_from(LinkState),
+    members=st.lists(_text, max_size=2).map(tuple),
+    not_ready=st.lists(st.builds(NotReady, _text, _text), max_size=2).map(tuple),
 )
 messages = st.builds(
     RobotStatusMsg, _text, st.integers(0, 2**31 * 1_000_000 - 1), _statuses, _details, st.none() | st.just(0.1)

@@ -6,14 +6,23 @@ from typing import Any
 
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from mav_robot_status.interface import Detail, LinkState, RobotStatus, RobotStatusMsg
 from mav_robot_status.publishers.ros.cdr import HEADER
 from mav_robot_status.publishers.ros.diagnostics import diagnostic_status
-from mav_robot_status.publishers.ros.messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS, diagnostic_array, robot_status
+from mav_robot_status.publishers.ros.hardware_status import devices
+from mav_robot_status.publishers.ros.messages import (
+    DIAGNOSTIC_ARRAY,
+    HARDWARE_STATUS,
+    ROBOT_STATUS,
+    diagnostic_array,
+    hardware_status,
+    robot_status,
+)
 from mav_robot_status.testing.conformance.publisher import CASES, HOSTILE
 
-from .definitions import INDUSTRIAL_MSGS
+from .definitions import CONTROL_MSGS, INDUSTRIAL_MSGS
 from .statuses import FAILING, RADIO, message, messages
 
 typesys = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed: pip install rosbags")
@@ -25,12 +34,12 @@ PLAIN = [RobotStatusMsg("rover", 1_800_000_000_123_456, status, detail, 0.1) for
 def store() -> Any:
     """The types of Jazzy and industrial_msgs."""
     made = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
-    for name, text in INDUSTRIAL_MSGS.items():
+    for name, text in {**INDUSTRIAL_MSGS, **CONTROL_MSGS}.items():
         made.register(typesys.get_types_from_msg(text, name))
     return made
 
 
-@pytest.mark.parametrize("kind", [ROBOT_STATUS, DIAGNOSTIC_ARRAY])
+@pytest.mark.parametrize("kind", [ROBOT_STATUS, DIAGNOSTIC_ARRAY, HARDWARE_STATUS])
 def test_the_type_hash_is_that_of_the_definition(store: Any, kind: Any) -> None:
     assert store.hash_rihs01(kind.ros_name) == kind.hash
 
@@ -48,6 +57,24 @@ def test_any_status_is_encoded_byte_for_byte(store: Any, msg: RobotStatusMsg) ->
 @given(messages)
 def test_any_diagnostic_is_encoded_byte_for_byte(store: Any, msg: RobotStatusMsg) -> None:
     assert diagnostic_array(msg) == _by_rosbags(store, DIAGNOSTIC_ARRAY.ros_name, _ros_diagnostics(store, msg))
+
+
+@given(messages, st.lists(messages, max_size=3))
+def test_any_hardware_status_is_encoded_byte_for_byte(
+    store: Any, msg: RobotStatusMsg, others: list[RobotStatusMsg]
+) -> None:
+    latest = {other.handle: other for other in others}
+    values = _ros_hardware(store, msg, latest)
+    assert hardware_status(msg, latest) == _by_rosbags(store, HARDWARE_STATUS.ros_name, values)
+
+
+@pytest.mark.parametrize("link", LinkState)
+def test_the_hardware_status_of_a_robot_of_which_nothing_is_known_can_be_read(store: Any, link: LinkState) -> None:
+    payload = hardware_status(message(RobotStatus(), Detail(1, 1, link=link)), {})
+    (one,) = store.deserialize_cdr(payload, HARDWARE_STATUS.ros_name).hardware_device_states
+    (state,) = one.hardware_status
+    assert (one.device_id, state.health_status, state.operational_mode, state.power_state) == ("rover", 0, 0, 0)
+    assert not len(state.error_domain)
 
 
 @pytest.mark.parametrize("msg", PLAIN)
@@ -117,6 +144,25 @@ def _ros_diagnostics(store: Any, msg: RobotStatusMsg) -> Any:
     texts = [_shown(text) for text in (found.name, found.message, found.hardware_id)]
     status = types["diagnostic_msgs/msg/DiagnosticStatus"](int(found.level), *texts, values)
     return types[DIAGNOSTIC_ARRAY.ros_name](_ros_header(store, msg, ""), [status])
+
+
+def _ros_hardware(store: Any, msg: RobotStatusMsg, latest: dict[str, RobotStatusMsg]) -> Any:
+    import numpy
+
+    types, found = store.types, []
+    for one in devices(msg, latest):
+        kinds = numpy.array(one.error_domain, dtype=numpy.uint8)
+        details = [types["diagnostic_msgs/msg/KeyValue"](_shown(k), _shown(v)) for k, v in one.state_details]
+        numbers = (one.operational_mode, one.power_state, one.connectivity_status)
+        texts = map(_shown, (one.manufacturer, one.model, one.firmware_version))
+        state = types["control_msgs/msg/GenericHardwareState"](one.health_status, kinds, *numbers, *texts, details)
+        seconds, us = divmod(one.unix_us, 1_000_000)
+        stamp = types["builtin_interfaces/msg/Time"](seconds, us * 1000)
+        header = types["std_msgs/msg/Header"](stamp, _shown(one.device_id))
+        make = types["control_msgs/msg/HardwareDeviceStatus"]
+        found.append(make(header, _shown(one.device_id), [state], [], [], []))
+    handle = _shown(msg.handle)
+    return types[HARDWARE_STATUS.ros_name](_ros_header(store, msg, handle), handle, found)
 
 
 def _shown(text: str) -> str:

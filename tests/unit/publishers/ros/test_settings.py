@@ -43,6 +43,48 @@ def test_a_domain_is_a_number_up_to_232(url: str) -> None:
         read({"url": url}, {})
 
 
+@pytest.mark.parametrize(
+    ("environment", "local", "peers"),
+    [
+        ({}, False, ()),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, False, ()),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", "ROS_LOCALHOST_ONLY": "0"}, False, ()),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, True, ()),
+        ({"ROS_LOCALHOST_ONLY": "1"}, True, ()),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_LOCALHOST_ONLY": "1"}, True, ()),
+        ({"ROS_STATIC_PEERS": "10.0.0.5;;base.local;"}, False, ("10.0.0.5", "base.local")),
+    ],
+)
+def test_the_range_of_the_discovery_is_that_of_ros(
+    environment: dict[str, str], local: bool, peers: tuple[str, ...]
+) -> None:
+    found = read({"url": "dds://5"}, environment)
+    assert (found.local, found.peers) == (local, peers)
+    assert found.name == "DDS domain 5" + (" (LOCALHOST)" if local else "")
+    assert read({"url": "zenoh://router"}, environment) == read({"url": "zenoh://router"}, {})
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        (
+            "OFF",
+            "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: no subscriber could hear the gateway; write LOCALHOST",
+        ),
+        ("localhost", "must be one of SUBNET, LOCALHOST, OFF, SYSTEM_DEFAULT, not 'localhost'"),
+    ],
+)
+def test_a_range_without_subscribers_is_an_error(value: str, says: str) -> None:
+    with pytest.raises(UsageError, match=says):
+        read({"url": "dds://"}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": value})
+
+
+def test_the_topic_of_the_hardware_status_is_not_that_of_the_status() -> None:
+    assert read({"url": "dds://", "hardware_status": True}, {}).hardware_status
+    with pytest.raises(UsageError, match="topic: hardware_status is that of control_msgs/HardwareStatus"):
+        read({"url": "dds://", "hardware_status": True, "topic": "hardware_status"}, {})
+
+
 def test_a_wrong_domain_of_the_environment_is_named() -> None:
     with pytest.raises(UsageError, match=r"ROS_DOMAIN_ID in the environment: .* not 'abc'"):
         read({"url": "dds://"}, {"ROS_DOMAIN_ID": "abc"})

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from mav_robot_status.interface import LinkState
+from mav_robot_status.interface import Detail, LinkState, NotReady
 from mav_robot_status.publishers.ros import worker as module
-from mav_robot_status.publishers.ros.messages import ROBOT_STATUS, robot_status
+from mav_robot_status.publishers.ros.messages import HARDWARE_STATUS, ROBOT_STATUS, hardware_status, robot_status
 from mav_robot_status.publishers.ros.settings import DDS, Ros2Settings
 from mav_robot_status.publishers.ros.transport import Sample, UnreachableError
 from mav_robot_status.publishers.ros.worker import LONGEST_WAIT, STEADY, Gone, Worker, unknown
@@ -198,6 +198,26 @@ def test_the_topic_of_a_handle_that_is_gone_is_removed(worker: Worker, network: 
     worker.hand_over([MESSAGES[0], Gone("rover"), Gone("nobody")])
     wait_until(lambda: network.removed)
     assert network.removed == ["/rover/robot_status"]
+
+
+def test_the_hardware_status_of_a_group_is_that_of_its_members_and_unknown_at_the_end(
+    network: Network, clock: ManualClock
+) -> None:
+    arm, robot = message(handle="arm"), message(detail=Detail(members=("arm",)), handle="robot")
+    worker = Worker(network, SETTINGS._replace(hardware_status=True), clock)
+    worker.start()
+    worker.hand_over([arm, robot])
+    wait_until(lambda: len(network.sent) == 6)
+    topic, kind, payload, _ = network.sent[-1]
+    assert (topic, kind, payload) == ("/robot/hardware_status", HARDWARE_STATUS, hardware_status(robot, {"arm": arm}))
+    worker.hand_over([Gone("arm")])
+    wait_until(lambda: network.removed == ["/arm/robot_status", "/arm/hardware_status"])
+    worker.hand_over([arm])
+    worker.close()
+    last = {sample.topic: sample.payload for sample in network.sent}
+    gone = {msg.handle: unknown(msg, clock()) for msg in (arm, robot)}
+    assert last["/robot/hardware_status"] == hardware_status(gone["robot"], gone)
+    assert gone["robot"].detail.not_ready == (NotReady("arm", "LINK_STALE"),)
 
 
 def test_at_the_end_every_handle_is_unknown(worker: Worker, network: Network, clock: ManualClock) -> None:

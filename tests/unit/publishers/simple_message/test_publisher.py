@@ -12,7 +12,7 @@ import pytest
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import LinkError
-from mav_robot_status.interface import PublisherContext, RobotMode, RobotStatus, RobotStatusMsg
+from mav_robot_status.interface import PublisherContext, RobotMode, RobotStatus, RobotStatusMsg, TriState
 from mav_robot_status.publishers.simple_message.publisher import LOOK, SimpleMessagePublisher
 
 from ....deadline import SOON, allow
@@ -62,6 +62,19 @@ def test_a_client_does_not_get_the_status_of_a_handle_that_is_gone(publisher: Si
         publisher.service(Instant(1.0, 0))
         publisher.publish(msg())
         assert modes(client, 1) == [-1]
+
+
+@pytest.mark.parametrize("pings", [b"", struct.pack("<4i", 12, 1, 2, 0) * 3])
+def test_the_last_frame_says_that_nothing_is_known(pings: bytes) -> None:
+    with closing(made()) as publisher, connected(publisher) as client:
+        publisher.publish(msg(AUTO._replace(drives_powered=TriState.FALSE, in_error=TriState.TRUE, error_code=7)))
+        publisher.service(Instant(1.0, 0))
+        client.sendall(pings)
+        publisher.close()
+        data = b""
+        while more := client.recv(1000):
+            data += more
+        assert struct.unpack("<11i", data[-44:])[4:] == (-1, -1, 0, -1, -1, -1, -1)
 
 
 def test_it_looks_at_its_clients_ten_times_a_second(publisher: SimpleMessagePublisher) -> None:

@@ -202,6 +202,19 @@ def test_half_a_request_and_silence_changes_nothing(ends: Ends) -> None:
     ends.look_until(client, PONG)
 
 
+def test_a_half_open_client_gives_its_place_back_within_20_seconds(ends: Ends) -> None:
+    """While frames wait for their acknowledgement, the kernel sends no keepalives."""
+    ends.connect()
+    ends.look()
+    (client,) = ends.server._clients.values()
+    assert client.socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 20_000
+    idle, interval, count = (
+        client.socket.getsockopt(socket.IPPROTO_TCP, option)
+        for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+    )
+    assert idle + interval * count == 20
+
+
 def test_what_one_client_sends_does_not_touch_another(ends: Ends) -> None:
     hostile, other = ends.connect(), ends.connect()
     hostile.sendall(b"\xff" * 5000)

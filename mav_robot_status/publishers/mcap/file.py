@@ -57,7 +57,12 @@ class File:
         self._writer.start(profile=profile, library=f"mav-robot-status {__version__}")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
-        self.write_out()
+        try:
+            self.write_out()
+        except OSError:
+            self.close()
+            path.unlink()  # a full disk would get an empty file with each attempt
+            raise
 
     @property
     def size(self) -> int:

@@ -66,7 +66,6 @@ class McapPublisher:
             "json",
         )
         self._flush_at = self._retry_at = math.inf
-        self._failure: str | None = None
         self.dropped = 0
         """Messages that are in no file."""
         self._file: File | None = None
@@ -88,6 +87,8 @@ class McapPublisher:
         """Add one message, or two of ROS 2."""
         seq = self._seq.get(msg.handle, 0)
         self._seq[msg.handle] = seq + 1
+        if self._file is not None and self._is_full(self._file, msg.unix_us):
+            self._guarded(self._split)
         if self._file is None:
             self.dropped += 1
             return
@@ -126,14 +127,15 @@ class McapPublisher:
             self._file.close()
             self._file = None
 
+    def _is_full(self, file: File, us: int) -> bool:
+        return file.first_us is not None and (us - file.first_us >= self._limits.us or file.size >= self._limits.size)
+
+    def _split(self, file: File) -> None:
+        file.finish()
+        self._file = self._next_file()
+        file.close()
+
     def _add(self, file: File, msg: RobotStatusMsg, seq: int) -> None:
-        if file.first_us is not None and (
-            msg.unix_us - file.first_us >= self._limits.us or file.size >= self._limits.size
-        ):
-            file.finish()
-            following = self._next_file()
-            file.close()
-            self._file = file = following
         if self._ros2:
             file.add(self._topics.of(msg.handle), self._ros_schema(ROBOT_STATUS), msg.unix_us, robot_status(msg), seq)
             file.add(DIAGNOSTICS, self._ros_schema(DIAGNOSTIC_ARRAY), msg.unix_us, diagnostic_array(msg), seq)
@@ -150,11 +152,12 @@ class McapPublisher:
             path = self._path
             if self._number > 1:
                 path = path.with_name(f"{path.stem}-{self._number}{path.suffix}")
-            self._number += 1
             try:
                 made = self._files.File(path, "ros2" if self._ros2 else "")
             except FileExistsError:
+                self._number += 1
                 continue
+            self._number += 1
             log.info("mcap: writing %s", path)
             return made
 
@@ -165,7 +168,7 @@ class McapPublisher:
             self._retry_at = math.inf
             return
         log.warning("mcap: writing again, to %s; %d messages are in no file", self._file.path, self.dropped)
-        self._failure, self._retry_at = None, math.inf
+        self._retry_at = math.inf
 
     def _guarded(self, step: Callable[[File], None]) -> None:
         """Run a step on the file. A failure ends the file. Raises LinkError in a replay."""

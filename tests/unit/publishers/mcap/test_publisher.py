@@ -130,7 +130,10 @@ def test_a_file_that_fails_is_followed_by_a_new_one_and_what_is_lost_is_counted(
         publisher.publish(msg())
         assert publisher.dropped == 2
         assert publisher.service(Instant(2.0, 0)) == 2.0 + RETRY
-    assert publisher.service(Instant(2.0 + RETRY, 0)) is None
+        publisher.service(Instant(2.0 + RETRY, 0))
+        assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+        publisher.service(Instant(3.0 + RETRY, 0))
+    assert publisher.service(Instant(3.0 + 2 * RETRY, 0)) is None
     publisher.publish(msg())
     publisher.close()
     assert len(read(tmp_path / "a-2.mcap")) == 1

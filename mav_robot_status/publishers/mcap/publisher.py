@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 from ...data_files import data_file
 from ...errors import LinkError, UsageError
+from ...extras import install
 from ..json_lines import Bodies, native
 from ..ros.definitions import DEFINITIONS
 from ..ros.messages import DIAGNOSTIC_ARRAY, ROBOT_STATUS, MessageType, diagnostic_array, robot_status
@@ -50,7 +51,7 @@ class McapPublisher:
         except ModuleNotFoundError as error:
             if (error.name or "").startswith("mav_robot_status"):
                 raise
-            raise UsageError("mcap: this output needs an extra: pip install 'mav-robot-status[mcap]'") from None
+            raise UsageError(f"mcap: this output needs an extra: {install('mcap')}") from None
         self._files = files
         self._path = Path(options.path)
         self._ros2 = options.format == "ros2"

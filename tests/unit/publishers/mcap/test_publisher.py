@@ -5,6 +5,7 @@ import errno
 import io
 import json
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.errors import LinkError, UsageError
+from mav_robot_status.extras import install
 from mav_robot_status.gateway.replay import NoMavlinkPort
 from mav_robot_status.interface import PublisherContext
 from mav_robot_status.publishers.json_lines import native, native_body
@@ -168,3 +170,13 @@ def test_a_split_is_a_time_or_a_size(text: str | None, limits: Limits) -> None:
 def test_another_split_is_one_line(text: str) -> None:
     with pytest.raises(UsageError, match=r"mcap: split: .* is no time or size; write 1h or 100MB"):
         limits_of(text)
+
+
+def test_a_missing_extra_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "mav_robot_status.publishers.mcap.file")
+    monkeypatch.delattr("mav_robot_status.publishers.mcap.file", raising=False)
+    monkeypatch.setitem(sys.modules, "mcap.writer", None)
+    with pytest.raises(UsageError) as raised:
+        made(tmp_path / "a.mcap")
+    assert str(raised.value) == f"mcap: this output needs an extra: {install('mcap')}"
+    assert not list(tmp_path.iterdir())

@@ -173,7 +173,7 @@ def test_another_split_is_one_line(text: str) -> None:
 
 
 def test_a_missing_extra_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "mav_robot_status.publishers.mcap.file")
+    monkeypatch.delitem(sys.modules, "mav_robot_status.publishers.mcap.file", raising=False)
     monkeypatch.delattr("mav_robot_status.publishers.mcap.file", raising=False)
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     with pytest.raises(UsageError) as raised:

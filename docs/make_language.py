@@ -43,16 +43,16 @@ def tones() -> Iterator[str]:
 def values() -> Iterator[str]:
     yield "## Values\n"
     yield "The sign is that of a terminal, with its form without UTF-8. The short word is for narrow columns. The bar"
-    yield "is the form in a timeline.\n"
+    yield "is the form in a timeline. Rows that several fields share stand once.\n"
+    of: dict[tuple[str, ...], list[str]] = {}
     for name, looks in LOOKS.items():
-        yield f"### {name}\n"
-        yield from table(
-            ("value", "word", "short", "shape", "sign", "tone", "bar"),
-            (
-                (f"`{_json(value)}`", o.word, o.short or o.word, o.shape, f"`{o.glyph}` `{o.ascii}`", o.tone, o.bar)
-                for value, o in looks.items()
-            ),
-        )
+        for value, o in looks.items():
+            look = (o.word, o.short or o.word, o.shape, f"`{o.glyph}` `{o.ascii}`", o.tone, o.bar)
+            of.setdefault((_json(value), *look), []).append(name)
+    yield from table(
+        ("field", "value", "word", "short", "shape", "sign", "tone", "bar"),
+        ((", ".join(names), f"`{value}`", *look) for (value, *look), names in of.items()),
+    )
 
 
 def states() -> Iterator[str]:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 import pathlib
@@ -156,7 +157,7 @@ def _code(text: str | None) -> str:
 
 
 def _default(option: Declared) -> str:
-    if option.default in (None, (), ""):
+    if option.default in (None, (), "", dataclasses.MISSING):
         return ""
     text = str(option.default).lower().removesuffix(".0") if option.kind in (bool, float) else str(option.default)
     bounds = f", {option.option.low:g} to {option.option.high:g}" if option.option.low > -math.inf else ""

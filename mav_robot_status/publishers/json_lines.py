@@ -94,6 +94,26 @@ class JsonOptions(Options):
     changes_only: Annotated[bool, Option("JSON lines only on change", "--changes-only")] = False
 
 
+class Bodies:
+    """The text of each handle's latest status: most lines repeat the line before."""
+
+    def __init__(self) -> None:
+        self._latest: dict[str, tuple[RobotStatus, Detail, str]] = {}
+
+    def of(self, msg: RobotStatusMsg) -> str:
+        """`native_body` of a message."""
+        cached = self._latest.get(msg.handle)
+        if cached is not None and cached[0] is msg.status and cached[1] is msg.detail:
+            return cached[2]
+        body = native_body(msg.handle, msg.status, msg.detail)
+        self._latest[msg.handle] = (msg.status, msg.detail, body)
+        return body
+
+    def forget(self, handle: str) -> None:
+        """Release what belongs to a handle that is gone."""
+        self._latest.pop(handle, None)
+
+
 class JsonLinesPublisher:
     """Writes lines to a file or to standard output. A slow reader loses lines; it never blocks the gateway.
 
@@ -110,7 +130,7 @@ class JsonLinesPublisher:
         output = PatientLineOutput if context.patient else LineOutput
         self._output: LineOutput | PatientLineOutput = output(options.path, context.stdout)
         self._seq: dict[str, int] = {}
-        self._bodies: dict[str, tuple[RobotStatus, Detail, str]] = {}
+        self._bodies = Bodies()
 
     def busy(self) -> bool:
         """True while an earlier line is written in part, or the pipe is full."""
@@ -131,7 +151,7 @@ class JsonLinesPublisher:
         seq = self._seq.get(msg.handle, 0)
         self._seq[msg.handle] = seq + 1
         other = ROS_FORMATS.get(self._format)
-        line = native(msg, seq, self._body(msg)) if other is None else other(msg, seq)
+        line = native(msg, seq, self._bodies.of(msg)) if other is None else other(msg, seq)
         self._output.write(msg.handle, line.encode())
 
     def service(self, now: Instant) -> float | None:
@@ -141,16 +161,8 @@ class JsonLinesPublisher:
     def forget(self, handle: str) -> None:
         """Release what belongs to a handle that is gone."""
         self._seq.pop(handle, None)
-        self._bodies.pop(handle, None)
+        self._bodies.forget(handle)
 
     def close(self) -> None:
         """Write the rest of a line if the pipe has room, and close the file."""
         self._output.close()
-
-    def _body(self, msg: RobotStatusMsg) -> str:
-        cached = self._bodies.get(msg.handle)
-        if cached is not None and cached[0] is msg.status and cached[1] is msg.detail:
-            return cached[2]
-        body = native_body(msg.handle, msg.status, msg.detail)
-        self._bodies[msg.handle] = (msg.status, msg.detail, body)
-        return body

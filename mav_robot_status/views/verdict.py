@@ -11,6 +11,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import rfc3339
+from ..language import State
+from ..language.states import ROBOT_STATES
 from .totals import arm_cycles
 
 if TYPE_CHECKING:
@@ -26,11 +28,8 @@ LONGEST_TEXT: Final = 70
 SECOND: Final = 1_000_000
 TOGETHER: Final = 3 * SECOND
 """A disarm that follows an error within this time belongs to it."""
-WORDS: Final = (
-    "EMERGENCY STOP", "CRASHED", "CONFLICT", "FAULT", "LOST", "CANNOT ARM", "UNKNOWN", "NOT HEARD", "ARMED", "MOVING",
-    "READY", "PARKED",
-)  # fmt: skip
-"""The words for a state, the worst first."""
+STATES: Final = {state.word: state for state in ROBOT_STATES}
+"""By their words, the worst first."""
 CRASHES: Final = ("CRASH", "FLIGHT_TERMINATION", "TERMINATION_ANNOUNCED")
 CONFLICTS: Final = ("SYSTEM_ID_CONFLICT",)
 BY_ITSELF: Final = re.compile(r"(crash check|failsafe|fence|termination|parachute|traffic|error of its software)")
@@ -43,14 +42,14 @@ _MOVING: Final = re.compile(r" (?:while it moved|in the air).*$")
 class Verdict(NamedTuple):
     """What a person reads first."""
 
-    word: str
-    """Of the worst state of the whole log; one of WORDS."""
+    state: State
+    """The worst of the whole log."""
     sentence: str
     """At most LONGEST characters; in it may be words of the autopilot, which are untrusted."""
 
     def members(self) -> JsonObject:
         """The members in JSON."""
-        return {"state": self.word.replace(" ", "_"), "word": self.word, "sentence": self.sentence}
+        return {"state": self.state.word.replace(" ", "_"), "word": self.state.word, "sentence": self.sentence}
 
 
 class _Log(NamedTuple):
@@ -90,7 +89,7 @@ def verdict(timeline: Timeline, vehicle: VehicleTimeline) -> Verdict:
     for find in FINDERS:
         for word, rest in find(log):
             text = f"{word}{rest}."
-            return Verdict(word, text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…")
+            return Verdict(STATES[word], text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…")
     raise AssertionError("the last finder always finds")
 
 

@@ -48,7 +48,7 @@ def motion_possible(
     """Whether a motion command would move the vehicle now. Errors and sensors do not matter."""
     state = facts.heartbeat.system_status
     if drives is FALSE:
-        return FALSE, why_drives._replace(rule=f"drives_powered is false: {why_drives.rule}")
+        return FALSE, why_drives._replace(rule=off(why_drives.rule))
     if hides_armed(facts) or (drives is UNKNOWN and not facts.armed):
         return UNKNOWN, why_drives
     if state in NOT_MOVING_STATES:
@@ -62,3 +62,8 @@ def motion_possible(
     if state == MAV_STATE_UNINIT:
         return UNKNOWN, Reason("state UNINIT", state_words)
     return TRUE, Reason("armed, not stopped, in a state that moves", state_words)
+
+
+def off(rule: str) -> str:
+    """Why motion is not possible, from the reason why its drives have no power."""
+    return f"Drives are off: {'it is disarmed' if rule == 'disarmed' else rule}"

@@ -226,7 +226,7 @@ def test_explain_names_the_member_that_decided(arm: FakeArm) -> None:
     found = {one["handle"]: one["fields"] for one in map(json.loads, done.stdout.splitlines())}
     assert found["robot"]["e_stopped"]["value"] is False
     assert found["robot"]["e_stopped"]["rule"] == "arm: emergency stop bits, and no other safety_status beside them"
-    assert found["arm"]["e_stopped"]["source"] == "safety_status_bits 0x001"
+    assert found["arm"]["e_stopped"]["source"] == "safety_status_bits 0x001, safety_status 1"
 
 
 @pytest.mark.parametrize("arguments", [("--arm", "kuka:10.0.0.1"), ("watch", "--arm", "ur:"), ("doctor", "--arm", "x")])

@@ -18,6 +18,7 @@ from ...mavlink.enumerations import MAV_VTOL_STATE_MC, MAV_VTOL_STATE_UNDEFINED
 from .autopilots import announced_as
 from .estop import outputs, pending_command
 from .estop import state as estop
+from .estop.motor_test import MotorTest
 from .faults import latches, parts, sensors, text_assembly
 from .heartbeat.state import HeartbeatHistory, first_heartbeat
 from .identity import FIXED_PITCH, Family, family_of, sensor_name
@@ -106,6 +107,8 @@ class VehicleState:
     rotation: Motion = field(default_factory=Motion)
     """The motion according to rotation alone. Its FALSE means nothing."""
     watch: outputs.Watch = field(default_factory=outputs.Watch)
+    test: MotorTest = field(default_factory=MotorTest)
+    """The evidence that a motor turns while disarmed."""
     switches: Mapping[int, int] = field(default_factory=dict)
     """RCn_OPTION by channel, as far as received."""
     texts: text_assembly.TextAssembly = text_assembly.EMPTY

@@ -22,7 +22,7 @@ SAMPLES: Final = 2
 """Outputs in a row with a driven motor that prove a turning motor."""
 LASTS: Final = 3.0
 """Seconds for which a motor may turn after the last output that drove it."""
-AFTER_DISARM: Final = 0.3
+AFTER_DISARM: Final = 1.0
 """Seconds after a disarm in which outputs may be older than it."""
 COASTS: Final = 10.0
 """Seconds after a disarm in which a motor may turn without power: recorded, the rotor of a helicopter, wheels."""

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .autopilots import Autopilot
     from .autopilots.firmware import Firmware
     from .autopilots.modes import AvailableMode
+    from .autopilots.profile import Version
     from .autopilots.sensor_weights import Weight
     from .estop.applet import Applet
     from .options import HardwareOptions
@@ -168,10 +169,13 @@ class VehicleState:
 
     def counting_faults(self, options: HardwareOptions) -> list[tuple[int, Weight, sensors.Fault]]:
         """The faults in SYS_STATUS that have a meaning for this vehicle, at this site."""
-        firmware = self.version
+        check, status = self.profile.stops.check, self.latest.sys_status
+        least: Version | None = self.version
+        if least is None and check is not None and status is not None and sensors.has_prearm_check(status.message):
+            least = check.prearm_check
         return [
             found
-            for found in sensors.counting(self.faults, self.profile, firmware, self.heartbeats.armed)
+            for found in sensors.counting(self.faults, self.profile, least, self.heartbeats.armed)
             if sensor_name(found[0]) not in options.ignore_sensors
         ]
 

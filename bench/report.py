@@ -1,4 +1,5 @@
-"""The result of a run as Markdown. `python -m bench.report PAGE.md` puts the committed results into a page.
+"""The result of a run as Markdown. `python -m bench.report` prints all tables of the committed results, and
+`python -m bench.report PAGE.md` puts the targets into a page.
 
 `results.json` is the last run, `before.json` an earlier one to compare with. Values measured on a busy machine would
 mislead, so the tables of such a run have ratios and memory only.
@@ -36,6 +37,12 @@ def render(result: dict[str, Any], before: dict[str, Any] | None = None) -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
+def summary(result: dict[str, Any]) -> str:
+    """The machine, and the table of those targets that were measured."""
+    cases = [{**case, "targets": [t for t in case["targets"] if t["value"] is not None]} for case in result["cases"]]
+    return f"{_head(result)}\n\n{_targets({**result, 'cases': cases}, None)}\n"
+
+
 def _head(result: dict[str, Any]) -> str:
     """The machine and the versions, on one line."""
     machine, versions = result["machine"], result["versions"]
@@ -65,13 +72,16 @@ def into(page: str, table: str) -> str:
 
 
 def write(page: Path, results: Path) -> None:
-    """Put the results in a folder into a page. The earlier result is left out if it is the same run."""
+    """Put the targets of the last run in a folder into a page."""
+    page.write_text(into(page.read_text(), summary(json.loads((results / "results.json").read_text()))))
+
+
+def committed(results: Path) -> str:
+    """All tables of the last run in a folder. The earlier result is left out if it is the same run."""
     result = json.loads((results / "results.json").read_text())
     earlier = results / "before.json"
     before = json.loads(earlier.read_text()) if earlier.exists() else None
-    if before and before["date"] == result["date"]:
-        before = None
-    page.write_text(into(page.read_text(), render(result, before)))
+    return render(result, before if before and before["date"] != result["date"] else None)
 
 
 def _targets(result: dict[str, Any], before: dict[str, Any] | None) -> str:
@@ -165,11 +175,14 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Put the committed results into a page."""
-    if len(arguments) != 1:
-        print("usage: python -m bench.report PAGE.md", file=sys.stderr)
+    """Print the committed results, or put their targets into a page."""
+    if len(arguments) > 1:
+        print("usage: python -m bench.report [PAGE.md]", file=sys.stderr)
         return 2
-    write(Path(arguments[0]), RESULTS)
+    if arguments:
+        write(Path(arguments[0]), RESULTS)
+    else:
+        print(committed(RESULTS), end="")
     return 0
 
 

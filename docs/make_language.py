@@ -12,8 +12,7 @@ from collections.abc import Iterator
 
 from make_reference import table
 
-from mav_robot_status.language import LOOKS, TONES
-from mav_robot_status.language.headline import ROWS
+from mav_robot_status.language import LOOKS, ROBOT_STATES, TONES
 
 HERE = pathlib.Path(__file__).resolve().parent
 
@@ -44,30 +43,33 @@ def tones() -> Iterator[str]:
 def values() -> Iterator[str]:
     yield "## Values\n"
     yield "The sign is that of a terminal, with its form without UTF-8. The short word is for narrow columns. The bar"
-    yield "is the form in a timeline.\n"
+    yield "is the form in a timeline. Rows that several fields share stand once.\n"
+    of: dict[tuple[str, ...], list[str]] = {}
     for name, looks in LOOKS.items():
-        yield f"### {name}\n"
-        yield from table(
-            ("value", "word", "short", "shape", "sign", "tone", "bar"),
-            (
-                (f"`{_json(value)}`", o.word, o.short or o.word, o.shape, f"`{o.glyph}` `{o.ascii}`", o.tone, o.bar)
-                for value, o in looks.items()
-            ),
-        )
-
-
-def headlines() -> Iterator[str]:
-    yield "## Headlines\n"
-    yield "A headline is one word, then why, then the next step. An error makes any headline an alarm, of rank 1. A"
-    yield "robot that cannot move for a reason that needs a person is a warning, of rank 3. A list begins with the"
-    yield "lowest rank.\n"
+        for value, o in looks.items():
+            look = (o.word, o.short or o.word, o.shape, f"`{o.glyph}` `{o.ascii}`", o.tone, o.bar)
+            of.setdefault((_json(value), *look), []).append(name)
     yield from table(
-        ("of a robot that is", "word", "shape", "tone", "rank"),
-        ((state, row.word, row.look.shape, row.tone, row.rank) for state, row in ROWS.items()),
+        ("field", "value", "word", "short", "shape", "sign", "tone", "bar"),
+        ((", ".join(names), f"`{value}`", *look) for (value, *look), names in of.items()),
     )
-    yield "*Not ready* and *partly stopped* are said of groups: another member may move.\n"
-    yield "A lost link is never a reason why motion is not possible. It says that nothing is known, since when, and"
-    yield "what was last known: “Unknown since 14:03:10. It may be moving. Last known: AUTO, moving.”"
+
+
+def states() -> Iterator[str]:
+    yield "## States of a robot\n"
+    yield "The worst first. Page, `watch`, report, events and ground stations use the same words. The severity is"
+    yield "MAV_SEVERITY, that of the STATUSTEXT to ground stations.\n"
+    yield from table(
+        ("of a robot that is", "word", "shape", "sign", "severity", "tone"),
+        ((o.meaning, o.word, o.shape, f"`{o.glyph}` `{o.ascii}`", o.severity, o.tone) for o in ROBOT_STATES),
+    )
+    yield "A headline is the word, then why, with the cause first, then the next step. A robot that moves with an error"
+    yield "or a stop is MOVING, in the tone of an alarm, and its first sentence names the trouble. A list begins with"
+    yield "the worst.\n"
+    yield "A group says of each member what it is: “base is stopped; arm is READY and may move.” It is never called"
+    yield "stopped or parked while a member may move.\n"
+    yield "A lost link is never a reason why motion is not possible. It says when the robot was last heard, and what it"
+    yield "was then: “Last heard 14:03:10: armed, moving, AUTO. It may be moving.”\n"
 
 
 def _json(value: object) -> str:
@@ -76,7 +78,7 @@ def _json(value: object) -> str:
 
 def page() -> str:
     """The whole page."""
-    return HEAD + "\n" + "\n".join(line for part in (tones(), values(), headlines()) for line in part).rstrip() + "\n"
+    return HEAD + "\n" + "\n".join(line for part in (states(), tones(), values()) for line in part).rstrip() + "\n"
 
 
 def main() -> int:

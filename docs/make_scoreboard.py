@@ -137,11 +137,6 @@ def by_family(scores: dict[str, Score]) -> Iterator[str]:
     yield from table(head, ([name, scores[str(name)].recordings, *rest] for name, *rest in rows))
 
 
-def share_by_family(scores: dict[str, Score]) -> Iterator[str]:
-    head = ("right % of", *(f"`{field}`" for field in FIELDS))
-    yield from table(head, ([name, *(percent(s.fields[field]) for field in FIELDS)] for name, s in scores.items()))
-
-
 def wrong(score: Score) -> Iterator[str]:
     if not score.wrong:
         yield "No answer is WRONG."
@@ -154,8 +149,9 @@ def wrong(score: Score) -> Iterator[str]:
     yield from table(("WRONG in", "field", "answer", "truth", "visible in", "checkpoints"), rows)
 
 
-def without_output_watch(score: Score) -> Iterator[str]:
-    rows = [row(f"`{field}`", score.fields[field]) for field in FIELDS]
+def without_output_watch(score: Score, watched: Score) -> Iterator[str]:
+    """The fields that differ, and all."""
+    rows = [row(f"`{f}`", score.fields[f]) for f in FIELDS if +score.fields[f] != +watched.fields[f]]
     yield from table(("without the watch", "checkpoints", *VERDICTS, "right %"), [*rows, row("all", score.all)])
 
 
@@ -190,9 +186,8 @@ def blocks() -> dict[str, str]:
     lines = {
         "by field": by_field(total),
         "by family": by_family(watched),
-        "share by family": share_by_family(watched),
         "wrong": wrong(total),
-        "without output watch": without_output_watch(together(unwatched.values())),
+        "without output watch": without_output_watch(together(unwatched.values()), total),
         "bad links": bad_links(path for paths in families.values() for path in paths),
     }
     return {name: "\n".join(text) + "\n" for name, text in lines.items()}

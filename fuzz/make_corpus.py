@@ -6,12 +6,14 @@ import lzma
 import random
 import struct
 from pathlib import Path
+from typing import Any
 
 from fuzz.work import SHAPES
 from mav_robot_status.links.url import KINDS
 from mav_robot_status.mavlink.definitions import MESSAGES, Statustext
 from mav_robot_status.mavlink.encode import encode
 from mav_robot_status.mavlink.signing import Signer
+from tests.onboard_logs import dataflash, ulog
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parent / "config"
@@ -59,6 +61,32 @@ def frames(version: int) -> list[bytes]:
     return made
 
 
+def onboard_logs() -> list[bytes]:
+    """A DataFlash log, the same as text, and a ULog file."""
+    arm: list[tuple[Any, ...]] = [
+        (2.0, "MSG", "ArduRover V4.5.6 (3cba3e7f)"),
+        (2.0, "PARM", "SERVO3_FUNCTION", 70.0, 70.0),
+    ]
+    drive = [(3.0 + n / 5, "GPS", 0, 6, 1000 * n, 2446, 4.0, 0.0) for n in range(9)]
+    stop = [(3.5, "ARM", 1, 1, 0, 1), (4.0, "EV", 54), (4.0, "MAVC", 255, 190, 218, 31.0, 0), (4.5, "ERR", 12, 1)]
+    rest = [(4.6, "RCOU", 1500, 0, 1600, 0), (4.7, "STAT", 1, 1, 2, 0), (5.0, "MODE", 4, 4, 19), (9.0, "EV", 11)]
+    binary = dataflash(*sorted([*arm, *drive, *stop, *rest], key=lambda one: one[0]))
+    text = b"""FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns
+FMT, 1, 17, ARM, QBIBB, TimeUS,ArmState,ArmChecks,Forced,Method
+FMT, 5, 75, MSG, QZ, TimeUS,Message
+MSG, 2000000, ArduCopter V4.5.6 (3cba3e7f)
+ARM, 3000000, 1, 1, 0, 1
+ARM, 4000000, 0, 0, 0, 12
+"""
+    flight: list[tuple[Any, ...]] = [(1 + n / 4, "vehicle_local_position", 1.0, 0.0, 0.0, True, True) for n in range(8)]
+    status = [(1 + n / 2, "vehicle_status", 4, 2, 1, 1, False, True, 0, 0) for n in range(5)]
+    kill = [(1.2, "actuator_armed", True, False, False, False), (2.0, "actuator_armed", True, False, True, False)]
+    texts = [(1.1, "L", "[commander] Armed by external command"), (2.1, "O", 20), (2.2, "L", "Failsafe activated")]
+    test = [(2.5, "actuator_test", 0.5, 500, 101, 1), (2.6, "vehicle_land_detected", False, False)]
+    px4 = ulog(*sorted([*flight, *status, *kill, *texts, *test], key=lambda one: one[0]), start=1)
+    return [binary, text, px4]
+
+
 def main() -> None:
     """Write everything."""
     signer = Signer(bytes(range(32)), 3)
@@ -74,6 +102,7 @@ def main() -> None:
     write("texts", [b"".join(bytes([20, 3, n % 4, n]) + text[10:30] for n in range(12)), rng.randbytes(500)])
     write("event_table", [TABLE, lzma.compress(TABLE)])
     write("events", [rng.randbytes(2000), rng.randbytes(500)])
+    write("onboard_log", onboard_logs())
     opening = bytes([4, 1, 7, 0]) + (100).to_bytes(4, "little")
     write("files", [opening * 3, opening + bytes([59, 1, 7, 0]) + bytes(60), opening + rng.randbytes(400)])
     write("configuration", [*(path.read_bytes() for path in sorted(EXAMPLES.glob("*.yaml"))), RARE])

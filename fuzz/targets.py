@@ -9,6 +9,7 @@ from mav_robot_status.clock import Instant
 from mav_robot_status.config.document import parse_document
 from mav_robot_status.config.reader import build
 from mav_robot_status.errors import ConfigError, UsageError
+from mav_robot_status.gateway.logs.onboard_recording import DATAFLASH, DATAFLASH_TEXT, ULOG, form_of
 from mav_robot_status.hardware.mavlink.faults import text_assembly
 from mav_robot_status.hardware.mavlink.interface import MavlinkRobotHW
 from mav_robot_status.hardware.mavlink.options import HardwareOptions
@@ -18,6 +19,8 @@ from mav_robot_status.hardware.mavlink.px4_events.parsing import TableError
 from mav_robot_status.hardware.mavlink.px4_events.parsing import parse as parse_table
 from mav_robot_status.hardware.mavlink.px4_events.sequence import ASKABLE, KEPT
 from mav_robot_status.hardware.mavlink.subjects import WANTED_IDS
+from mav_robot_status.hardware.onboard_log.interface import OnboardLogRobotHW
+from mav_robot_status.interface import validate
 from mav_robot_status.links.url import parse
 from mav_robot_status.mavlink.definitions import MESSAGES, CurrentEventSequence, Event, Heartbeat, Statustext
 from mav_robot_status.mavlink.encode import enclose, encode
@@ -42,6 +45,8 @@ KEY: Final = bytes(32)
 SOME: Final = sorted(WANTED_IDS)
 MOST_REQUESTS: Final = 200
 """The most requests of a download after the last answer: it gives up long before."""
+MOST_PENDING: Final = 1 << 17
+"""Bytes of an incomplete record: a message of ULog has at most 65538."""
 LONGEST_LINE: Final = 2000
 """The most characters of an error message."""
 
@@ -178,6 +183,35 @@ def _event(chunk: bytes, count: int) -> Event | CurrentEventSequence:
     return Event(number, count * 250, sequence, 0, 0, chunk[2], chunk[3:].ljust(40, b"\0")[:40])
 
 
+def onboard_log(data: bytes) -> int:
+    """Any onboard log: its reader keeps little, time does not go back but at a new start, the status is consistent.
+
+    A unit is an input.
+    """
+    form = form_of(data) or (DATAFLASH, DATAFLASH_TEXT, ULOG)[len(data) % 3]
+    hw = OnboardLogRobotHW(lambda: form.meaning(HardwareOptions()), "log", HardwareOptions())
+    reader = form.reader(hw.meaning.wanted())
+    pieces = [data[start : start + PIECE] for start in range(0, len(data), PIECE)]
+    us, mono = 0, 0.0
+    for found in (*map(reader.feed, pieces), reader.finish()):
+        for record in found:
+            if record.us < us:
+                hw.forget()
+            mono, us = mono + min(max(record.us - us, 0), 10**9) / 1e6, record.us
+            hw.begun(0.0, reader.names())
+            hw.on_frame(record, Instant(mono, us))
+            if mono >= hw.next_due():
+                hw.read(Instant(mono, us))
+            form.utc_us(record.values)
+        assert reader.pending <= MOST_PENDING
+    assert reader.counts.bad_bytes <= len(data)
+    for handle in hw.handles:
+        hw.read(Instant(mono + 0.5, us))
+        problem = validate(handle.status, handle.detail, stops_cut_power=False)
+        assert problem is None, problem
+    return 1
+
+
 def configuration(data: bytes) -> int:
     """Any configuration file: it is valid, or the error is one line."""
     try:
@@ -276,6 +310,7 @@ TARGETS: Final[dict[str, Callable[[bytes], int]]] = {
     "connection": connection,
     "routing": routing,
     "simple_message": simple_message,
+    "onboard_log": onboard_log,
 }
 UNITS: Final = {
     "work": "bytes",
@@ -286,6 +321,7 @@ UNITS: Final = {
     "event_table": "tables",
     "events": "events",
     "files": "answers",
+    "onboard_log": "logs",
 }
 
 assert set(SOME) <= set(MESSAGES)

@@ -19,8 +19,7 @@ from .config import load as load_config
 from .errors import UsageError
 from .gateway.controller_config import DEFAULT_CONTROLLER
 from .gateway.event_loop import EventLoop
-from .gateway.logs.recorded_log import Recording
-from .gateway.replay import ReplayPipeline, run_through
+from .gateway.replay import ReplayPipeline, open_recording, run_through
 from .interface import Publisher, RobotStatusMsg
 from .links.url import parse
 from .publishers.queue import QueuePublisher
@@ -80,8 +79,8 @@ def _live(config: Config) -> Statuses:
 
 
 def _replayed(config: Config, log: str) -> Statuses:
-    recording = Recording(log)
-    pipeline = ReplayPipeline(config, NO_OUTPUT)
+    recording = open_recording(log)
+    pipeline = ReplayPipeline(config, NO_OUTPUT, recording=recording)
     queue = _queue(pipeline.publishers.values())
     stopped = threading.Event()
 

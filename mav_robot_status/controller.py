@@ -125,7 +125,8 @@ class IndustrialRobotStatusController:
                 output.changes.append(now)
             if msg is None:
                 age = None if handle.heard_at is None else now - handle.heard_at
-                msg = RobotStatusMsg(handle.name, time.unix_us, status, detail, age)
+                boot_s = None if handle.booted_at is None else now - handle.booted_at
+                msg = RobotStatusMsg(handle.name, time.unix_us, status, detail, age, boot_s)
             output.sent = self._sent
             output.publisher.publish(msg)
 

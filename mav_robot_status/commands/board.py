@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..errors import UsageError
+from ..extras import install
 from ..publishers.mqtt.settings import BrokerOptions
 from ..publishers.web.settings import DEFAULT_LISTEN, HttpOptions
 from .options import given, publisher, verbosity
@@ -31,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("mav_robot_status"):
             raise
-        raise UsageError("the board needs extras: pip install 'mav-robot-status[mqtt,web]'") from None
+        raise UsageError(f"the board needs extras: {install('mqtt', 'web')}") from None
     fleet = FleetBoard(source, page)
     fleet.stop_on_signals()
     fleet.run()

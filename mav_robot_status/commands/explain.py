@@ -15,7 +15,7 @@ from .overrides import configured
 def arguments(parser: argparse.ArgumentParser) -> None:
     """The connections and the time."""
     connections(parser)
-    parser.add_argument("--at", metavar="TIME", help="moment of a log: 2026-11-20T18:49:07Z, or +44 (seconds)")
+    parser.add_argument("--at", metavar="TIME", help="moment of a log: 2026-11-20T18:49:07Z, +44 (seconds), boot:93")
     parser.add_argument("--as-json", action="store_true", help="as JSON, one object for each vehicle")
     looking(parser)
 

@@ -16,6 +16,7 @@ from typing import Any, Final, TypeVar
 from ..config.model import LONGEST_NAME, is_vehicle_name
 from ..interface import Options
 from ..links.url import help_text
+from ..publishers.mcap.settings import McapOptions
 from ..publishers.mqtt.settings import MqttOptions
 from ..publishers.ros.settings import Ros2Options
 from ..publishers.simple_message.options import SimpleMessageOptions
@@ -27,6 +28,7 @@ _NAMED: Final = re.compile(r"([0-9]{1,3})(?:\.([0-9]{1,3}))?=(.*)", re.ASCII | r
 
 WITH_ARGUMENTS: Final[dict[str, type[Options]]] = {
     "http": HttpOptions,
+    "mcap": McapOptions,
     "mqtt": MqttOptions,
     "simple_message": SimpleMessageOptions,
     "ros2": Ros2Options,

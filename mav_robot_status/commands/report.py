@@ -20,7 +20,7 @@ from .overrides import loaded, only
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """The logs and the output file."""
-    parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log (.tlog)")
+    parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log (.tlog, .bin, .ulg)")
     parser.add_argument("-o", "--output", metavar="FILE.html", help="where to write (the log's name with .html, here)")
     parser.add_argument("--as-json", action="store_true", help="totals and intervals as JSON, not HTML; with -o both")
     parser.add_argument("--config", metavar="FILE", help="configuration (YAML)")

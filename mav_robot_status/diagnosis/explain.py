@@ -16,14 +16,15 @@ from ..config import Config
 from ..errors import UsageError
 from ..gateway.controller_config import DEFAULT_CONTROLLER
 from ..gateway.event_loop import EventLoop
+from ..gateway.logs.onboard_recording import OnboardRecording
 from ..gateway.logs.recorded_log import Recording
-from ..gateway.replay import ReplayPipeline, run_through
+from ..gateway.replay import ReplayPipeline, open_recording, run_through
 from ..hardware.mavlink.interface import MavlinkRobotHW
 from ..hardware.mavlink.senders import Sender, senders
 from ..interface import HardwareInterface, IndustrialRobotStatusHandle, LinkState
 from ..interface.explanation import explanation
 from ..json_object import JsonObject
-from ..language import remedy
+from ..language import remedy, same_step
 from ..links.log import Stamped
 from ..streams import NO_OUTPUT
 from .vehicle_reports import PAGE, WORDS, applet_reports, arming_checks
@@ -35,17 +36,33 @@ LISTEN: Final = 5.0
 ANSWERS: Final = 25.0
 """Seconds from the first heartbeat to the explanation while answers of the autopilot are outstanding. Its parameters
 take 17 s."""
+SINCE_BOOT: Final = "boot:"
 PATIENCE: Final = 30.0  # s to wait for the first heartbeat
 
 
 def explain_log(config: Config, path: str, at: str | None) -> list[JsonObject]:
     """The explanations at a time in a log, by default at its end.
 
-    `at` is an RFC 3339 time, or `+44` for seconds after the first record. Raises UsageError if the log lacks it.
+    `at` is an RFC 3339 time, `+44` for seconds after the first record, or, of an autopilot's own log, `boot:93` for
+    seconds after its start. Raises UsageError if the log lacks it.
     """
-    pipeline = ReplayPipeline(silent(config), NO_OUTPUT)
-    end = run_through(pipeline, _up_to(Recording(path), at))
+    recording = open_recording(path)
+    pipeline = ReplayPipeline(silent(config), NO_OUTPUT, recording=recording)
+    if at is not None and at.startswith(SINCE_BOOT):
+        at = _since_boot(recording, at)
+    end = run_through(pipeline, _up_to(recording, at))
     return explanations(pipeline.hw, pipeline.vehicles, end)
+
+
+def _since_boot(recording: Recording | OnboardRecording, at: str) -> str:
+    """`boot:93` as RFC 3339. Raises UsageError."""
+    if not isinstance(recording, OnboardRecording):
+        raise UsageError(f"--at {at}: only an autopilot's own log (.bin, .ulg) tells when it has started; write +44")
+    try:
+        seconds = float(at.removeprefix(SINCE_BOOT))
+        return rfc3339(recording.preview.boot_unix_us + round(seconds * 1e6))
+    except (ValueError, OverflowError):
+        raise UsageError(f"--at {at}: write boot:93 for 93 seconds after the start of the autopilot") from None
 
 
 def _up_to(recording: Iterable[Stamped], at: str | None) -> Iterator[Stamped]:
@@ -163,6 +180,7 @@ def _table(one: JsonObject) -> Iterator[str]:
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
     for row in rows:
         yield "  ".join((row[0].ljust(widths[0]), row[1].ljust(widths[1]), row[2].rjust(widths[2]), row[3]))
+    yield from _unknown(one)
     for sender in one.get("senders", ()):
         yield f"sender   {Sender(**sender).words}"
     if "applet" in one:
@@ -170,6 +188,13 @@ def _table(one: JsonObject) -> Iterator[str]:
     yield from _causes(one)
     for check in one.get("arming_checks", ()):
         yield f"check    {_checked(check)}"
+
+
+def _unknown(one: JsonObject) -> Iterator[str]:
+    """What would make the UNKNOWN fields known. Fields that need the same share a line."""
+    steps = {name: field["next"] for name, field in one["fields"].items() if field["next"] is not None}
+    for step, names in same_step(steps).items():
+        yield f"{'unknown':<9}{', '.join(names)}: {step}"
 
 
 def _causes(one: JsonObject) -> Iterator[str]:

@@ -7,9 +7,10 @@ from typing import Protocol
 
 from ..clock import Instant
 from ..config import Config
+from ..gateway.logs.onboard_recording import OnboardRecording
 from ..gateway.logs.recorded_log import Recording
 from ..gateway.observer import Observer
-from ..gateway.replay import ReplayPipeline, run_through
+from ..gateway.replay import ReplayPipeline, open_recording, run_through
 from ..interface import IndustrialRobotStatusHandle, IndustrialRobotStatusInterface, LinkState
 from ..links.log import Stamped
 from ..streams import NO_OUTPUT
@@ -34,13 +35,15 @@ def watch(config: Config, path: str, viewer: Viewer, progress: Callable[[float],
 
     Returns a summary line of the log. Raises UsageError if the log cannot be read.
     """
-    recording = Recording(path)
-    pipeline = ReplayPipeline(silent(config), NO_OUTPUT, observers=[_Look(viewer)])
+    recording = open_recording(path)
+    pipeline = ReplayPipeline(silent(config), NO_OUTPUT, [_Look(viewer)], recording)
     viewer.end(run_through(pipeline, _segments(recording, viewer, progress)))
     return recording.summary()
 
 
-def _segments(recording: Recording, viewer: Viewer, progress: Callable[[float], None]) -> Iterator[Stamped]:
+def _segments(
+    recording: Recording | OnboardRecording, viewer: Viewer, progress: Callable[[float], None]
+) -> Iterator[Stamped]:
     """The recording. Notifies the viewer at the start of each segment."""
     first = True
     for stamped in recording:

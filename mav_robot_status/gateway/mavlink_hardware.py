@@ -95,6 +95,8 @@ class MavlinkHardware:
     def _configure(self, config: Config) -> None:
         self._config = config
         self.vehicles.asks = config.requests == "missing" and not all(link.passive for link in config.links)
+        why = "(requests: none)" if config.requests == "none" else "(passive)"
+        self.vehicles.never_asked = f"mav-robot-status does not ask for it {why}."
         self._want_tables(config)
         if publishes(config, "mavlink"):
             self.hub.receiver.commands.offered |= {ROBOT_STATUS}

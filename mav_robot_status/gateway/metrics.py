@@ -48,6 +48,7 @@ def _connection(endpoint: Endpoint) -> ConnectionMetrics:
         endpoint.link.dropped,
         endpoint.budget.sent,
         endpoint.budget.withheld,
+        endpoint.left_out,
     )
 
 

@@ -36,6 +36,7 @@ OURS: Final[dict[str, dict[str, str]]] = {
         "http": "mav_robot_status.publishers.web.publisher:HttpPublisher",
         "json": "mav_robot_status.publishers.json_lines:JsonLinesPublisher",
         "mavlink": "mav_robot_status.publishers.mavlink:MavlinkPublisher",
+        "mcap": "mav_robot_status.publishers.mcap.publisher:McapPublisher",
         "mirror": "mav_robot_status.publishers.named_value:NamedValuePublisher",
         "mqtt": "mav_robot_status.publishers.mqtt.publisher:MqttPublisher",
         "queue": "mav_robot_status.publishers.queue:QueuePublisher",

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..clock import later
 from ..interface import LinkState
+from ..links.log import LogReader
 from .live_hardware import combined, open_interface
+from .logs.onboard_recording import OnboardRecording, form_of
 from .logs.recorded_log import Recording
 from .mavlink_hardware import robot_hw
 from .pipeline import NEVER, Pipeline
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
     from ..clock import Instant
     from ..config import Config
+    from ..hardware.mavlink.interface import MavlinkRobotHW
+    from ..hardware.onboard_log.interface import OnboardLogRobotHW
     from ..interface import Audience
     from ..links.log import Stamped
     from .observer import Observer
@@ -58,9 +62,9 @@ def replay(config: Config, path: str, stdout: TextIO, *, raw: bool = False) -> N
 
     Raises UsageError if it cannot be read, BrokenPipeError if stdout is closed.
     """
-    recording = Recording(path, raw)
+    recording = open_recording(path, raw)
     log.info("replaying %s", path)
-    pipeline = ReplayPipeline(config, stdout)
+    pipeline = ReplayPipeline(config, stdout, recording=recording)
     try:
         pipeline.now = run_through(pipeline, recording)
     finally:
@@ -68,14 +72,31 @@ def replay(config: Config, path: str, stdout: TextIO, *, raw: bool = False) -> N
     log.info("%s", recording.summary())
 
 
+def open_recording(path: str, raw: bool = False) -> Recording | OnboardRecording:
+    """Open a log. Its first bytes decide what it is. Raises UsageError if it cannot be read."""
+    reader = LogReader(path)
+    form = None if raw else form_of(reader.head)
+    return Recording(reader, raw) if form is None else OnboardRecording(reader, form)
+
+
 class ReplayPipeline(Pipeline):
     """A pipeline for a recorded log."""
 
-    def __init__(self, config: Config, stdout: TextIO, observers: Sequence[Observer] = ()) -> None:
-        """Make the parts. Hardware interfaces other than MAVLink register their handles and open nothing."""
+    def __init__(
+        self,
+        config: Config,
+        stdout: TextIO,
+        observers: Sequence[Observer] = (),
+        recording: Recording | OnboardRecording | None = None,
+    ) -> None:
+        """Make the parts. Hardware interfaces other than that of the log register their handles and open nothing."""
         self.vehicles = robot_hw(config)
+        """Those of a log of MAVLink."""
+        own = recording.hardware(config) if isinstance(recording, OnboardRecording) else None
+        self.log_hw: MavlinkRobotHW | OnboardLogRobotHW = own or self.vehicles
+        """That of the log."""
         others = [open_interface(interface, replay=True, clock=lambda: self.now) for interface in config.interfaces]
-        hw = combined(config, self.vehicles, others)
+        hw = combined(config, self.log_hw, others)
         self.max_gap = config.max_gap
         self.source = next((RecordedLink(link.heartbeat_timeout) for link in config.links), RecordedLink(None))
         super().__init__(config, hw, NoMavlinkPort(), stdout, patient=True, observers=observers)
@@ -94,7 +115,7 @@ class ReplayPipeline(Pipeline):
 
 def run_through(pipeline: ReplayPipeline, recording: Iterable[Stamped]) -> Instant:
     """Feed a recording to the pipeline. Returns the last instant; everything due before it is done."""
-    hw = pipeline.vehicles
+    hw = pipeline.log_hw
     last = NEVER
     due = -math.inf  # time starts at the first record
     for now, frame, new_segment in recording:

@@ -165,7 +165,7 @@ def _field(group: Group, field: str, members: Sequence[Member]) -> tuple[TriStat
     others = f", and {len(deciding) - 1} more" if len(deciding) > 1 else ""
     if why is None:
         return value, Evidence(f"{first.name}{others}", None, first.heard_at)
-    return value, Evidence(f"{first.name}{others}: {why.rule}", why.source, why.at)
+    return value, Evidence(f"{first.name}{others}: {why.rule}", why.source, why.at, why.next)
 
 
 def _code(members: Sequence[Member], in_error: TriState) -> int:

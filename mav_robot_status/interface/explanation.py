@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from ..clock import Instant, rfc3339
 from ..json_object import JsonObject
 from .fields import STATES, Field
 from .handle import IndustrialRobotStatusHandle
 
+NO_ADVICE: Final = "Look at what its controller reports, or at its members: `explain` names the source of each field."
+"""What would make a field known of a robot whose interface does not say."""
+
 
 def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> JsonObject:
     """The status in a handle with its evidence. Ages are in seconds at `now`; UNKNOWN is None.
+
+    `next` is what would make a field known, None where it is known.
 
     `members`, `ready` and `not_ready` are those of a JSON line: only a group has them.
     """
@@ -34,9 +41,11 @@ def explanation(handle: IndustrialRobotStatusHandle, now: Instant) -> JsonObject
 
 def _field(handle: IndustrialRobotStatusHandle, field: Field, now: float) -> JsonObject:
     evidence = handle.evidence.get(field.name)
+    value = field.plain(getattr(handle.status, field.name))
     return {
-        "value": field.plain(getattr(handle.status, field.name)),
+        "value": value,
         "rule": evidence.rule if evidence else None,
         "source": evidence.source if evidence else None,
         "age": None if evidence is None or evidence.at is None else round(now - evidence.at, 3),
+        "next": ((evidence and evidence.next) or NO_ADVICE) if value in (None, "UNKNOWN") else None,
     }

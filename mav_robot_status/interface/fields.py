@@ -59,8 +59,6 @@ class Row(NamedTuple):
     """The meaning of TRUE for a TriState; the meaning of a mode or a code. One line."""
     bits: int | None = None
     """The lower of its two bits in NAMED_VALUE_INT RS_STATE."""
-    announced: bool = False
-    """Whether ground stations get a STATUSTEXT when it changes."""
     ros1: str | None = SAME
     """Its name in industrial_msgs/RobotStatus of ROS 1."""
     ros2: str | None = SAME
@@ -72,12 +70,12 @@ class Row(NamedTuple):
 class RobotStatus(NamedTuple):
     """The table: the seven fields of industrial_msgs/RobotStatus. As created, nothing is known."""
 
-    mode: Annotated[RobotMode, Row("Who moves it: a person (MANUAL), a program (AUTO).", 0, True)] = RobotMode.UNKNOWN
-    e_stopped: Annotated[TriState, Row("An emergency stop is engaged.", 2, True)] = TriState.UNKNOWN
+    mode: Annotated[RobotMode, Row("Who moves it: a person (MANUAL), a program (AUTO).", 0)] = RobotMode.UNKNOWN
+    e_stopped: Annotated[TriState, Row("An emergency stop is engaged.", 2)] = TriState.UNKNOWN
     drives_powered: Annotated[TriState, Row("The robot is armed and nothing blocks its drives.", 4)] = TriState.UNKNOWN
-    motion_possible: Annotated[TriState, Row("The robot would execute a motion command.", 6, True)] = TriState.UNKNOWN
+    motion_possible: Annotated[TriState, Row("The robot would execute a motion command.", 6)] = TriState.UNKNOWN
     in_motion: Annotated[TriState, Row("The robot moves, turns or is airborne.", 8)] = TriState.UNKNOWN
-    in_error: Annotated[TriState, Row("At least one error cause is active.", 10, True)] = TriState.UNKNOWN
+    in_error: Annotated[TriState, Row("At least one error cause is active.", 10)] = TriState.UNKNOWN
     error_code: Annotated[int, Row("The most important active cause, 0 if there is none.", ros2="error_codes")] = 0
 
 

@@ -16,7 +16,7 @@ class IndustrialRobotStatusHandle:
     a value, and the hardware interface sets a new one. A reader can keep what it read.
     """
 
-    __slots__ = ("detail", "evidence", "heard_at", "name", "status")
+    __slots__ = ("booted_at", "detail", "evidence", "heard_at", "name", "status")
 
     def __init__(self, name: str, status: RobotStatus | None = None) -> None:
         self.name = name
@@ -24,6 +24,8 @@ class IndustrialRobotStatusHandle:
         self.detail = Detail()
         self.heard_at: float | None = None
         """When (monotonic seconds) the robot's controller was last heard; None if never or unknown."""
+        self.booted_at: float | None = None
+        """When (monotonic seconds) the robot's controller has started; None unless its own log is replayed."""
         self.evidence: Mapping[str, Evidence] = {}
         """Why each field has its value, by name of the field; empty if the hardware interface gives no reasons."""
 

@@ -34,6 +34,8 @@ class ConnectionMetrics(NamedTuple):
     """Bytes that we sent without being asked."""
     withheld: int = 0
     """Messages that we held back because of `speech_limit`."""
+    left_out: int = 0
+    """Senders that are not heard, because there are too many."""
 
 
 class PublisherMetrics(NamedTuple):

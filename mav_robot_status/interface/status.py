@@ -129,6 +129,8 @@ class Evidence(NamedTuple):
     """The message that decided, with its bit, field or text."""
     at: float | None = None
     """When that message arrived: seconds on the monotonic clock."""
+    next: str | None = None
+    """What would make the field known if it is UNKNOWN, in whole sentences; None: the interface does not say."""
 
 
 class Detail(NamedTuple):
@@ -184,3 +186,5 @@ class RobotStatusMsg(NamedTuple):
     detail: Detail
     heartbeat_age: float | None
     """Seconds since the robot's controller was last heard; None if never."""
+    boot_s: float | None = None
+    """Seconds since the robot's controller has started; None unless its own log is replayed."""

@@ -1,14 +1,36 @@
-"""The headline of a status: one large word, then why, then what to do next."""
+"""The headline of a status: one large word, then why with the cause first, then what to do next."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime, timedelta
 from typing import Final, NamedTuple
 
 from ..json_object import JsonMapping
-from .remedies import Remedy, remedy
-from .values import UNKNOWN, Look, Tone, look
+from .remedies import remedy
+from .states import (
+    ARMED,
+    CANNOT_ARM,
+    CRASHED,
+    EMERGENCY_STOP,
+    LOST,
+    MOVING,
+    NOT_HEARD,
+    PARKED,
+    READY,
+    UNHEARD,
+    UNKNOWN,
+    UNSURE,
+    State,
+    cannot_arm,
+    causes,
+    errors,
+    part,
+    sentence,
+    state_of,
+    troubles,
+)
+from .values import Tone, look
 
 Line = JsonMapping
 """The members of a JSON line."""
@@ -23,154 +45,215 @@ class Sentence(NamedTuple):
     """A time after the text, as RFC 3339. A view shows it in the time zone of its reader."""
     quote: str | None = None
     """The words of the autopilot after it. Untrusted."""
+    rest: str = ""
+    """What follows the time."""
 
     def plain(self, clock: Callable[[str], str]) -> str:
         """The sentence in one string."""
         parts = [self.text, "" if self.at is None else clock(self.at), "" if self.quote is None else f"“{self.quote}”"]
-        return " ".join(part for part in parts if part) + ("" if self.text.endswith((".", ":")) else ".")
+        return " ".join(part for part in parts if part) + self.rest + ("" if self.text.endswith(".") else ".")
 
 
 class Headline(NamedTuple):
     """What a person reads first."""
 
-    word: str
-    shape: str
-    glyph: str
-    ascii: str
+    state: State
     tone: Tone
+    """That of the state; of a robot that moves although it is stopped or in error, that of the trouble."""
+    rank: int
+    """The order of problems in a fleet: the lowest first."""
     sentences: tuple[Sentence, ...]
     """Why, in the order of importance."""
     step: str = ""
     """The next step; empty if nobody must do anything."""
     topic: str = ""
     """The heading of docs/how-to/cannot-move.md; empty: none."""
-    rank: int = 0
-    """The order of problems in a fleet: the lowest first."""
+
+    @property
+    def word(self) -> str:
+        """The word of the state."""
+        return self.state.word
 
 
-class _Row(NamedTuple):
-    """The headline of a state."""
-
-    word: str
-    look: Look
-    tone: Tone
-    rank: int
-
-
-LOST_LOOK: Final = look("link", "LOST")
-STOPPED, ERROR = look("e_stopped", True), look("in_error", True)
-CAN_MOVE, CANNOT_MOVE = look("motion_possible", True), look("motion_possible", False)
-MOVING: Final = look("in_motion", True)
-
-ROWS: Final = {
-    "lost": _Row("LOST", LOST_LOOK, "warning", 2),
-    "not heard": _Row("NOT HEARD", look("link", "NEVER_SEEN"), "unknown", 4),
-    "moving": _Row("MOVING", MOVING, "active", 6),
-    "stopped": _Row("EMERGENCY STOP", STOPPED, "alarm", 0),
-    "partly stopped": _Row("STOPPED IN PART", STOPPED, "alarm", 0),
-    "can move": _Row("CAN MOVE", CAN_MOVE, "active", 7),
-    "cannot move": _Row("CANNOT MOVE", CANNOT_MOVE, "calm", 8),
-    "not ready": _Row("NOT READY", CANNOT_MOVE, "warning", 3),
-    "unknown": _Row("UNKNOWN", UNKNOWN, "unknown", 5),
-}
-IN_ERROR: Final = 1
-"""The rank of a robot in error."""
-NEEDS_A_LOOK: Final = 3
-"""The rank of one that cannot move for a reason that needs a person."""
-
-UNHEARD: Final = "LINK_STALE"
-"""The inhibit that says that a robot is not heard."""
-SINCE: Final = "Unknown since"
-LAST: Final = "Last known"
+LAST: Final = "Last heard"
 MAY_MOVE: Final = Sentence("It may be moving")
+MAY_START: Final = Sentence("It may start at any time")
 MOTION_UNKNOWN: Final = Sentence("Whether it moves is unknown")
-PART: Final = Sentence("Another member may move: look at each")
-"""For a group whose line does not say which members are ready."""
+FIRST_WORDS: Final = {
+    "CRASH": "Crashed",
+    "FLIGHT_TERMINATION": "Terminated",
+    "TERMINATION": "Terminated",
+    "TERMINATION_ANNOUNCED": "Terminated",
+    "E_STOPPED": "Emergency stop engaged",
+}
+"""What the first sentence calls a cause."""
 OF_A_MEMBER: Final = {
     "E_STOPPED": "is stopped",
-    UNHEARD: "is not heard and may move",
-    "MOTION_UNKNOWN": "may be able to move",
+    UNHEARD: "is LOST and may move",
+    "MOTION_UNKNOWN": "is UNKNOWN and may move",
 }
-"""What a member does that is not ready, by the reason."""
+"""What a member of a group is that is not ready, by the reason."""
+UNTOLD: Final = UNSURE | {"E_STOPPED"}
+"""The inhibits that another sentence tells."""
 
 
-def headline(line: Line, last: Line | None = None) -> Headline:
-    """The headline of a JSON line. `last` is the last line of the same handle whose link was CONNECTED, if known."""
-    state = _state(line)
-    row = ROWS[state]
-    if state in ("lost", "not heard"):
-        return _built(row, _unheard(line, last, state), remedy({"name": UNHEARD}))
-    causes = [*_list(line, "errors"), *_inhibits(line), *_unheard_members(line)]
-    sentences = (
-        *_why(line, state),
-        *map(_sentence, _list(line, "errors")),
-        *(() if _members(line) else map(_quoted, _unheard_members(line))),
-        *(() if state == "unknown" or isinstance(line.get("in_motion"), bool) else (MOTION_UNKNOWN,)),
-        *_charge(line, state),
-    )
-    needy = next((found for cause in causes if (found := remedy(cause)).person), None)
-    tone, rank = row.tone, row.rank
-    if line.get("in_error") is True:
-        tone, rank = "alarm", min(rank, IN_ERROR)
-    if line.get("e_stopped") is True or _stopped_members(line):  # it, or another member, may still move
-        tone, rank = "alarm", ROWS["stopped"].rank
-    elif tone == "calm" and needy is not None:
-        tone, rank = "warning", NEEDS_A_LOOK
-    first = needy or (remedy(causes[0]) if causes else None)
-    return _built(row._replace(tone=tone, rank=rank), sentences, first)
+def headline(line: Line, last: Line | None = None, members: Mapping[str, Line] | None = None) -> Headline:
+    """The headline of a JSON line. `last` is the last line of the same handle whose link was CONNECTED, if known.
+
+    `members` are the lines of the members of a group by handle, as far as they are known.
+    """
+    state, found = state_of(line), troubles(line)
+    tone, rank = state.tone, state.rank
+    own = {} if members is None else {name: members[name] for name in _members(line) if name in members}
+    if state is EMERGENCY_STOP and any(one.get("e_stopped") is not True for one in own.values()):
+        state = min((state_of(one) for one in own.values() if one.get("e_stopped") is not True), key=_rank)
+    wrong = [one for each in own.values() for one in troubles(each)] if own else found
+    worst = min((one.state for one in wrong), key=_rank, default=None)
+    if worst is not None and worst.rank < rank:
+        tone, rank = worst.tone, worst.rank
+    if not own and any(one.get("why") == "E_STOPPED" for one in causes(line, "not_ready")):
+        tone, rank = EMERGENCY_STOP.tone, EMERGENCY_STOP.rank  # another member may still move
+    sentences = (*(_of_members(own) if own else _not_ready(line)), *_why(line, last, state))
+    reported = [one.cause for one in wrong if one.cause] + _inhibits(line)
+    steps = [remedy({"name": UNHEARD})] if state in (LOST, NOT_HEARD) else [remedy(cause) for cause in reported]
+    step = next((one for one in steps if one.person), steps[0] if steps else None)
+    return Headline(state, tone, rank, tuple(dict.fromkeys(sentences)), *((step.step, step.topic) if step else ()))
 
 
-def _built(row: _Row, sentences: tuple[Sentence, ...], found: Remedy | None) -> Headline:
-    step, topic = (found.step, found.topic) if found else ("", "")
-    return Headline(
-        row.word, row.look.shape, row.look.glyph, row.look.ascii, row.tone, sentences, step, topic, row.rank
-    )
+def _rank(state: State) -> int:
+    return state.rank
 
 
-def _state(line: Line) -> str:
-    """The key of ROWS. For a group it never says that no part of it moves."""
-    link = _part(line, "link")
-    if link.get("state") != "CONNECTED":
-        return "not heard" if link.get("state") == "NEVER_SEEN" else "lost"
-    is_group = bool(line.get("members"))
-    if line.get("in_motion") is True:
-        return "moving"
-    if line.get("e_stopped") is True and (not is_group or _whole_is_stopped(line)):
-        return "stopped"
-    if is_group and line.get("motion_possible") is not True and (line.get("e_stopped") or _stopped_members(line)):
-        return "partly stopped"
-    if line.get("motion_possible") is True:
-        return "can move"
-    if line.get("motion_possible") is False:
-        return "not ready" if is_group else "cannot move"
-    return "unknown"
+def _members(line: Line) -> list[str]:
+    found = line.get("members")
+    return [one for one in found if isinstance(one, str)] if isinstance(found, list) else []
 
 
-def _unheard(line: Line, last: Line | None, state: str) -> tuple[Sentence, ...]:
-    if state == "not heard":
-        return (Sentence("No heartbeat has arrived"), MOTION_UNKNOWN)
+def _of_members(lines: Mapping[str, Line]) -> Iterator[Sentence]:
+    """What each member of a group is: `base is stopped; arm is READY and may move`."""
+    states = {name: state_of(line) for name, line in lines.items()}
+    told = sorted(states.items(), key=lambda one: one[1].rank)
+    yield Sentence("; ".join(f"{name} {state.member}{_may(lines[name], state)}" for name, state in told))
+
+
+def _not_ready(line: Line) -> Iterator[Sentence]:
+    """The same of a group whose members have no lines here, as far as its own line tells."""
+    why = {str(one.get("handle")): str(one.get("why")) for one in causes(line, "not_ready")}
+    if why:
+        yield Sentence("; ".join(f"{name} {_of_a_member(why.get(name))}" for name in _members(line)))
+
+
+def _of_a_member(why: str | None) -> str:
+    if why is None:
+        return "is READY and may move"
+    return OF_A_MEMBER.get(why) or f"is not ready: {remedy({'name': why}).sentence}"
+
+
+def _may(line: Line, state: State) -> str:
+    """Whether the member may move, too. Of one that is stopped or moves, its state says it."""
+    if state in (EMERGENCY_STOP, MOVING) or line.get("motion_possible") is False:
+        return ""
+    return " and may move"
+
+
+def _why(line: Line, last: Line | None, state: State) -> Iterator[Sentence]:
+    """The sentences: the cause first."""
+    if state in (LOST, NOT_HEARD):
+        yield from _unheard(line, last, state)
+        return
+    yield from _wrong(line, state)
+    unsure = [one for one in _inhibits(line) if one.get("name") in UNSURE]
+    if state is UNKNOWN:
+        yield from (_quoted(one, line) for one in unsure)
+        yield from (() if unsure else (Sentence("Whether it can move is unknown"),))
+        yield MAY_MOVE
+        return
+    yield from _standing(line, state)
+    yield from (_quoted(one, line) for one in unsure if state is PARKED or one.get("name") == UNHEARD)
+    yield from () if isinstance(line.get("in_motion"), bool) else (MOTION_UNKNOWN,)
+    if line.get("motion_possible") is not False:
+        yield _charge(line)
+
+
+def _wrong(line: Line, state: State) -> Iterator[Sentence]:
+    """The emergency stop, then the errors, then why it cannot arm."""
+    found = troubles(line)
+    terminated = [one.cause for one in found if one.state is CRASHED and one.cause not in errors(line)]
+    if line.get("e_stopped") is True:
+        own = [one for one in causes(line, "inhibits") if one.get("name") == "E_STOPPED"]
+        yield from (_first(one, line) for one in own or [{"name": "E_STOPPED"}])
+    yield from (_first(one, line) for one in (*terminated, *errors(line)))
+    if line.get("in_error") is True and not errors(line):
+        yield Sentence(f"Error {line.get('error_code')}: no reason was reported")
+    if state is not CANNOT_ARM:
+        return
+    for n, one in enumerate(cannot_arm(line)):
+        text, said = one.cause.get("text"), sentence(one.cause, line)
+        if text:
+            yield Sentence(_member(one.cause) + ("Also:" if n else "Cannot arm:"), None, str(text))
+        elif not n:
+            yield Sentence(f"Cannot arm: {'no reason was reported' if said == 'it cannot be armed' else said}")
+        elif said != "it cannot be armed":
+            yield Sentence(_begun(said))
+
+
+def _standing(line: Line, state: State) -> Iterator[Sentence]:
+    """Why a robot that is not energised stands, or why one that is does not move."""
+    if line.get("motion_possible") is not False:
+        yield from (MAY_START,) if state is not MOVING and not line.get("members") else ()
+        return
+    told = {id(one.cause) for one in (*troubles(line), *cannot_arm(line))}
+    said = [one for one in _inhibits(line) if id(one) not in told and one.get("name") not in UNTOLD]
+    words = ", ".join(dict.fromkeys(sentence(one, line) for one in said))
+    if state in (MOVING, ARMED):
+        yield Sentence(f"It ignores motion commands: {words}" if words else "It ignores motion commands")
+    elif troubles(line):
+        yield from (Sentence(_begun(words.removeprefix("it is "))),) if words else ()
+    elif words:
+        yield Sentence(f"{'Ready' if state is READY else 'Parked'}: {words}")
+
+
+def _first(cause: JsonMapping, line: Line) -> Sentence:
+    """A cause with the words of the autopilot: `Crashed: “Crash: Going to HOLD”`."""
+    text = cause.get("text")
+    said = FIRST_WORDS.get(str(cause.get("name")))
+    words = _begun(sentence(cause, line)) if said is None else _member(cause) + said
+    return Sentence(f"{words}:", None, str(text)) if text else Sentence(words)
+
+
+def _quoted(cause: JsonMapping, line: Line) -> Sentence:
+    text = cause.get("text")
+    words = _begun(sentence(cause, line))
+    return Sentence(f"{words}:", None, str(text)) if text else Sentence(words)
+
+
+def _unheard(line: Line, last: Line | None, state: State) -> Iterator[Sentence]:
+    if state is NOT_HEARD:
+        yield from (Sentence("No heartbeat has arrived"), MOTION_UNKNOWN)
+        return
     since = heard_at(line) or (None if last is None else heard_at(last))
-    first = Sentence(SINCE, since) if since else Sentence("Nothing is known")
-    return (first, MAY_MOVE, *(() if last is None else (Sentence(f"{LAST}: {last_known(last)}"),)))
+    known = "" if last is None else last_known(last)
+    if since or known:
+        yield Sentence(LAST, since, None, f": {known}" if known else "")
+    yield MAY_MOVE
 
 
 def last_known(last: Line) -> str:
-    """The last state before a loss in a few words: `AUTO, moving`."""
-    names = ("mode", "in_motion", "motion_possible", "e_stopped", "in_error")
-    words = {name: look(name, last.get(name)).word for name in names}
-    shown = [words["mode"] if last.get("mode") != "UNKNOWN" else "mode unknown"]
-    shown.append(words["in_motion"].lower() if last.get("in_motion") is not None else "motion unknown")
-    if last.get("in_motion") is not True and last.get("motion_possible") is not None:
-        shown.append(words["motion_possible"].lower())
-    shown += [
-        word for name, word in (("e_stopped", "emergency stop"), ("in_error", "in error")) if last.get(name) is True
+    """The last state before a loss in a few words: `armed, moving, AUTO`."""
+    powered = last.get("drives_powered")
+    shown = [
+        "emergency stop engaged" if last.get("e_stopped") is True else "",
+        "in error" if last.get("in_error") is True else "",
+        "armed" if powered is True else "disarmed" if powered is False else "",
+        look("in_motion", last.get("in_motion")).word.lower() if isinstance(last.get("in_motion"), bool) else "",
+        "" if last.get("mode") == "UNKNOWN" else str(last.get("mode") or ""),
     ]
-    return ", ".join(shown)
+    return ", ".join(word for word in shown if word)
 
 
 def heard_at(line: Line) -> str | None:
     """When the robot was last heard, as RFC 3339; None if the line does not tell."""
-    age = _part(line, "link").get("heartbeat_age")
+    age = part(line, "link").get("heartbeat_age")
     if not isinstance(age, (int, float)):
         return None
     try:
@@ -181,77 +264,20 @@ def heard_at(line: Line) -> str | None:
     return str(at.isoformat(timespec="milliseconds")).replace("+00:00", "Z")
 
 
-def _why(line: Line, state: str) -> tuple[Sentence, ...]:
-    """Why it cannot move, or what is not known."""
-    if state == "unknown":
-        return (
-            Sentence("Whether it can move is unknown"),
-            *(_members(line) or (MAY_MOVE,)),
-            *map(_quoted, _inhibits(line)),
-        )
-    if line.get("motion_possible") is not False:
-        return _members(line) or ((PART,) if state == "partly stopped" else ())
-    found = _inhibits(line)
-    if not found:
-        return () if state == "moving" else (Sentence("Cannot move"),)
-    names = dict.fromkeys(_member(one) + remedy(one).sentence for one in found)
-    says = "It executes no motion command" if state == "moving" else "Cannot move"
-    return (
-        Sentence(f"{says}: {', '.join(names)}"),
-        *map(_quoted, (one for one in found if one.get("text"))),
-        *_others(line),
-    )
+def _charge(line: Line) -> Sentence:
+    """Who drives it."""
+    flown = part(line, "vehicle").get("flight_mode")
+    mode = f" ({flown})" if flown else ""
+    who = {"AUTO": "A program drives it", "MANUAL": "A pilot drives it"}.get(str(line.get("mode")))
+    if who is None and flown:
+        number = str(flown).removeprefix("CMODE(").removesuffix(")")
+        return Sentence(f"Mode {number} is not in our tables: pilot or program, unknown")
+    return Sentence(f"{who}{mode}" if who else "Pilot or program: unknown")
 
 
-def _others(line: Line) -> tuple[Sentence, ...]:
-    """The members of a group that cannot move as a whole: another rule than ours may say so while one of them can."""
-    names, told = line.get("members"), _list(line, "not_ready")
-    if not names or (told and isinstance(names, list) and len(told) >= len(names)):
-        return ()
-    return _members(line) or (PART,)
-
-
-def _members(line: Line) -> tuple[Sentence, ...]:
-    """Each member of a group in which one is not ready: `base is stopped; arm is ready and may move`."""
-    not_ready = {str(one.get("handle")): one.get("why") for one in _list(line, "not_ready")}
-    names = line.get("members")
-    if not not_ready or not isinstance(names, list):
-        return ()
-    words = (f"{name} {_of_a_member(name, not_ready)}" for name in map(str, names))
-    return (Sentence("; ".join(words)),)
-
-
-def _of_a_member(name: str, not_ready: Mapping[str, object]) -> str:
-    if name not in not_ready:
-        return "is ready and may move"
-    why = not_ready[name]
-    return OF_A_MEMBER.get(str(why)) or f"is not ready: {remedy({'name': why}).sentence}"
-
-
-def _stopped_members(line: Line) -> list[str]:
-    """The members of a group whose emergency stop is engaged."""
-    return [str(one.get("handle")) for one in _list(line, "not_ready") if one.get("why") == "E_STOPPED"]
-
-
-def _whole_is_stopped(line: Line) -> bool:
-    names = line.get("members")
-    return isinstance(names, list) and set(map(str, names)) == set(_stopped_members(line))
-
-
-def _quoted(cause: JsonMapping) -> Sentence:
-    text, member = cause.get("text"), _member(cause)
-    said = remedy(cause).sentence
-    return (
-        Sentence(f"{member}The autopilot says", None, str(text))
-        if text
-        else Sentence(f"{member}{said}" if member else said[:1].upper() + said[1:])
-    )
-
-
-def _sentence(error: JsonMapping) -> Sentence:
-    """An error, with the words of the autopilot."""
-    text = error.get("text")
-    return Sentence(f"Error: {_member(error)}{remedy(error).sentence}", None, str(text) if text else None)
+def _inhibits(line: Line) -> list[JsonMapping]:
+    """The inhibits, those with words of the autopilot last."""
+    return sorted(causes(line, "inhibits"), key=lambda one: bool(one.get("text")))
 
 
 def _member(cause: JsonMapping) -> str:
@@ -259,32 +285,5 @@ def _member(cause: JsonMapping) -> str:
     return f"{cause['handle']}: " if cause.get("handle") else ""
 
 
-def _charge(line: Line, state: str) -> tuple[Sentence, ...]:
-    """Who commands it."""
-    if state in ("cannot move", "not ready", "stopped", "partly stopped"):
-        return ()
-    flown = _part(line, "vehicle").get("flight_mode")
-    mode = f" ({flown})" if flown else ""
-    who = {"AUTO": "A program commands it", "MANUAL": "A person commands it"}
-    return (Sentence(who.get(str(line.get("mode")), "Who commands it is unknown") + mode),)
-
-
-def _part(line: Line, name: str) -> JsonMapping:
-    found = line.get(name)
-    return found if isinstance(found, Mapping) else {}
-
-
-def _list(line: Line, name: str) -> list[JsonMapping]:
-    found = line.get(name)
-    return [one for one in found if isinstance(one, Mapping)] if isinstance(found, list) else []
-
-
-def _inhibits(line: Line) -> list[JsonMapping]:
-    """The inhibits, those with words of the autopilot last. A lost link is left out: it gives no reason."""
-    found = (one for one in _list(line, "inhibits") if one.get("name") != UNHEARD)
-    return sorted(found, key=lambda one: bool(one.get("text")))
-
-
-def _unheard_members(line: Line) -> list[JsonMapping]:
-    """The inhibits that say which members of a group are not heard."""
-    return [one for one in _list(line, "inhibits") if one.get("name") == UNHEARD]
+def _begun(text: str) -> str:
+    return text[:1].upper() + text[1:]

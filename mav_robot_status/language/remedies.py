@@ -24,6 +24,7 @@ class Remedy(NamedTuple):
     """Whether it needs a person. Disarmed is the calm state of a parked robot, and does not."""
 
 
+_SYSID: Final = "Give each autopilot its own system id (SYSID_THISMAV)."
 _CHARGE: Final = "Charge or change the battery."
 _RETURN: Final = "Bring it back or land it."
 _FIX: Final = "Be ready to take it over. Wait for a fix or check the antenna."
@@ -35,12 +36,12 @@ _INSPECT: Final = "Find out what happened, and inspect the vehicle before it is 
 _MOTORS: Final = f"{_REST} Disarm it, then check its motors, motor controllers and cables."
 _REPORT: Final = f"{_REST} Restart the autopilot, and have it checked if this comes back."
 _NAMED: Final = "Clear what the autopilot names."
-_LOOK: Final = "Look at the messages of the autopilot in a ground station."
+_LOOK: Final = "Read the messages of the autopilot in a ground station."
 _FIND_STOP: Final = "Find out why it was stopped, clear the cause, and confirm that on the teach pendant."
 
 INHIBIT_ROWS: Final[dict[str, Remedy]] = {
     "LINK_STALE": Remedy("its autopilot is not heard", "Check its power, the radio and the cable.", "link"),
-    "DISARMED": Remedy("disarmed", "Arm it if it is to move.", "disarmed", person=False),
+    "DISARMED": Remedy("it is disarmed", "To drive, arm it.", "disarmed", person=False),
     "E_STOPPED": Remedy(
         "the emergency stop is engaged",
         "Find out why the emergency stop is engaged, clear the cause, then release it.",
@@ -56,9 +57,7 @@ INHIBIT_ROWS: Final[dict[str, Remedy]] = {
     "CALIBRATING": Remedy(
         "the autopilot is calibrating its sensors", "Wait, and keep the vehicle still.", "starting", person=False
     ),
-    "POWERING_OFF": Remedy(
-        "the autopilot is shutting down", "Switch it on again if it is to move.", "starting", person=False
-    ),
+    "POWERING_OFF": Remedy("the autopilot is shutting down", "To drive, switch it on again.", "starting", person=False),
     "TERMINATION": Remedy("its operation was terminated", _INSPECT, "crash"),
     "EMERGENCY": Remedy("the autopilot reports an emergency", _INSPECT, "crash"),
     "HIL": Remedy(
@@ -70,22 +69,23 @@ INHIBIT_ROWS: Final[dict[str, Remedy]] = {
         "link",
     ),
     "MODE_MANUAL": Remedy(
-        "a person commands it", "Select an automatic mode if a program is to command it.", "mode", person=False
+        "a pilot drives it", "For a program to drive it, select an automatic mode.", "mode", person=False
     ),
     "STOP_UNCERTAIN": Remedy(
         "an emergency stop may still be engaged",
         "Look at its emergency stop, and let the autopilot report it.",
         "emergency-stop",
     ),
-    "SENDER_UNCERTAIN": Remedy(
-        "somebody else may speak with its ids", "Give every autopilot a system id of its own.", "senders"
-    ),
+    "SENDER_UNCERTAIN": Remedy("another device may use its system id", _SYSID, "senders"),
     "HEARTBEAT_LATE": Remedy(
         "frames arrive, but the heartbeat is late",
         "Look for a radio or a program that stores frames. The command doctor says how late they are.",
         "link",
     ),
-    "MOTION_NOT_POSSIBLE": Remedy("the robot does not say why", "Look at its own display.", "robot-arm"),
+    "LOG_GAP": Remedy(
+        "the log does not tell", "Look at what the log holds. The command doctor says what it lacks.", "link"
+    ),
+    "MOTION_NOT_POSSIBLE": Remedy("no reason was reported", "Look at its own display.", "robot-arm"),
 }
 """The inhibits of a vehicle and of a group."""
 
@@ -93,6 +93,7 @@ ERROR_ROWS: Final[dict[str, Remedy]] = {
     "FLIGHT_TERMINATION": Remedy("its operation was terminated", _INSPECT, "crash"),
     "TERMINATION_ANNOUNCED": Remedy("its operation is being terminated", _INSPECT, "crash"),
     "CRASH": Remedy("it has crashed", _INSPECT, "crash"),
+    "DISARMED_IN_FLIGHT": Remedy("it was disarmed in flight and fell", _INSPECT, "crash"),
     "ATTITUDE_FAILURE": Remedy("it has lost its attitude", _INSPECT, "crash"),
     "THRUST_LOSS": Remedy("a motor may have lost its thrust", _MOTORS, "motors"),
     "PARACHUTE": Remedy("its parachute was released", _INSPECT, "crash"),
@@ -106,7 +107,7 @@ ERROR_ROWS: Final[dict[str, Remedy]] = {
     ),
     "GCS_LOST": Remedy(
         "the ground station is not heard by the autopilot",
-        "Connect the ground station or the computer that commands it again.",
+        "Connect the ground station, or the computer that drives it, again.",
         "ground-station",
     ),
     "BATTERY_LOW": Remedy("the battery is low", f"{_RETURN} {_CHARGE}", "battery"),
@@ -134,16 +135,14 @@ ERROR_ROWS: Final[dict[str, Remedy]] = {
     "ESC_FAILURE": Remedy("a motor controller fails", _MOTORS, "motors"),
     "BATTERY_FAULT": Remedy("the battery reports a fault", f"{_RETURN} Change the battery.", "battery"),
     "OFFBOARD_LOST": Remedy(
-        "the computer that commands it is not heard",
-        "Start the program that commands it, and check its connection.",
+        "the computer that drives it is not heard",
+        "Start the program that drives it, and check its connection.",
         "ground-station",
     ),
     "MISSION": Remedy(
         "its mission cannot continue", "Check the mission, and write it to the autopilot again.", "mission"
     ),
-    "SYSTEM_ID_CONFLICT": Remedy(
-        "two autopilots use its ids", "Give every autopilot a system id of its own.", "senders"
-    ),
+    "SYSTEM_ID_CONFLICT": Remedy("two autopilots use one system id", _SYSID, "senders"),
     "LINK_LOST": Remedy("its autopilot is not heard", "Check its power, the radio and the cable.", "link"),
     **{
         f"TEXT_{level}": Remedy("the autopilot reports a problem", _LOOK, "arming")
@@ -189,7 +188,7 @@ SENSOR_ROWS: Final[dict[str, Remedy]] = {
     "REVERSE_MOTOR": Remedy("its motors are reversed", _MOTORS, "motors"),
     "LOGGING": Remedy("it cannot write its log", f"{_REST} Check the SD card of the autopilot.", "logging"),
     "BATTERY": Remedy(
-        "the battery is low or its monitor fails",
+        "the battery or its monitor fails",
         f"{_RETURN} {_CHARGE} Then check the cable of its monitor.",
         "battery",
     ),
@@ -202,7 +201,7 @@ SENSOR_ROWS: Final[dict[str, Remedy]] = {
     "LEAK": Remedy("water has entered", "Bring it to the surface and take it out of the water.", "crash"),
 }
 """The parts that SYS_STATUS reports, by the name of the bit."""
-SENSOR: Final = Remedy("a sensor is not healthy", "Look at what the autopilot says about it.", "sensors")
+SENSOR: Final = Remedy("a sensor is not healthy", "Read the autopilot's message below.", "sensors")
 """A bit without a name."""
 
 ARM_ROWS: Final[dict[str, Remedy]] = {
@@ -225,10 +224,8 @@ ARM_ROWS: Final[dict[str, Remedy]] = {
         "a person must confirm its safety configuration", "Confirm it on the teach pendant.", "robot-arm"
     ),
     "BOOTING": Remedy("the controller is starting", "Wait until the controller has started.", "starting", person=False),
-    "POWER_OFF": Remedy("the arm has no power", "Switch the arm on if it is to move.", "robot-arm", person=False),
-    "BRAKES_ENGAGED": Remedy(
-        "its brakes are engaged", "Release the brakes if it is to move.", "robot-arm", person=False
-    ),
+    "POWER_OFF": Remedy("the arm has no power", "To move it, switch the arm on.", "robot-arm", person=False),
+    "BRAKES_ENGAGED": Remedy("its brakes are engaged", "To move it, release the brakes.", "robot-arm", person=False),
     "BACKDRIVE": Remedy("a person moves it by hand", "Wait until that person has finished.", "robot-arm", person=False),
     "UPDATING_FIRMWARE": Remedy(
         "its firmware is being updated", "Wait, and leave the controller switched on.", "starting", person=False
@@ -264,6 +261,10 @@ def remedy(cause: JsonMapping) -> Remedy:
     found = step_for(text)
     step, topic = (found.step, found.topic) if found else (_NAMED, row.topic)
     return row._replace(step=f"{_REST} {step}" if name in WHILE_ARMED else step, topic=topic)
+
+
+INITIALS: Final = {"gps": "GPS", "rc": "RC", "ekf": "EKF", "imu": "IMU", "esc": "ESC", "hil": "HIL", "gcs": "GCS"}
+"""The words of names that are initials."""
 
 
 def spoken(name: str) -> str:

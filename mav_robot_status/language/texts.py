@@ -150,7 +150,7 @@ TEXTS: Final[tuple[TextRemedy, ...]] = (
     ),
     # computers and links
     _row(
-        "ground-station", "Start the program that commands it, and check its connection.", "offboard|onboard controller"
+        "ground-station", "Start the program that drives it, and check its connection.", "offboard|onboard controller"
     ),
     _row(
         "ground-station",
@@ -218,7 +218,7 @@ TEXTS: Final[tuple[TextRemedy, ...]] = (
         "Give the gateway the table of its events: then it names the check.",
         r"\((\d+ modes?|all modes)\)",
     ),
-    _row("arming", "Look at the messages of the autopilot in a ground station.", "sys_status: "),
+    _row("arming", "Read the messages of the autopilot in a ground station.", "sys_status: "),
 )
 """By the words of an autopilot; the first row that matches decides."""
 

@@ -46,14 +46,14 @@ class Look(NamedTuple):
     """The same in a terminal without UTF-8."""
     tone: Tone
     short: str = ""
-    """The word in at most four letters, for narrow columns; empty: the word is short."""
+    """The word in at most five letters, for narrow columns; empty: the word is short."""
     bar: str = "hatched"
     """Its form in a timeline: `full`, `half`, `line` or `hatched`."""
 
 
 UNKNOWN: Final = Look("unknown", "unknown", "?", "?", "unknown", "unk")
-YES: Final = Look("YES", "yes", "●", "*", "calm", bar="full")
-NO: Final = Look("no", "ring", "○", "-", "calm", bar="line")
+YES: Final = Look("YES", "dot", "●", "*", "calm", bar="full")
+NO: Final = Look("no", "ring", "○", "o", "calm", bar="line")
 
 LINK: Final = "link"
 """The name of the link among the fields of LOOKS."""
@@ -65,34 +65,34 @@ LOOKS: Final[dict[str, dict[Any, Look]]] = {
         "UNKNOWN": UNKNOWN,
     },
     "motion_possible": {
-        True: Look("CAN MOVE", "yes", "●", "*", "active", "YES", bar="full"),
-        False: Look("cannot move", "bar", "▬", "=", "calm", "no", bar="line"),
+        True: Look("CAN MOVE", "dot", "●", "*", "active", "YES", bar="full"),
+        False: Look("cannot move", "ring", "○", "o", "calm", "no", bar="line"),
         None: UNKNOWN,
     },
     "in_motion": {
         True: Look("MOVING", "move", "▶", ">", "active", "MOVE", bar="full"),
-        False: Look("still", "still", "▪", ".", "calm", "no", bar="line"),
+        False: Look("still", "still", "▫", ".", "calm", "no", bar="line"),
         None: UNKNOWN,
     },
     "drives_powered": {
-        True: Look("POWERED", "power", "↯", "!", "active", "ON", bar="full"),
-        False: Look("off", "ring", "○", "-", "calm", bar="line"),
+        True: Look("POWERED", "power", "↯", "~", "active", "ON", bar="full"),
+        False: Look("off", "ring", "○", "o", "calm", bar="line"),
         None: UNKNOWN,
     },
     "e_stopped": {
         True: Look("STOPPED", "stop", "■", "#", "alarm", "STOP", bar="full"),
-        False: Look("released", "ring", "○", "-", "calm", "no", bar="line"),
+        False: Look("released", "ring", "○", "o", "calm", "no", bar="line"),
         None: UNKNOWN,
     },
     "in_error": {
-        True: Look("ERROR", "error", "▲", "X", "alarm", "ERR", bar="full"),
-        False: Look("none", "ring", "○", "-", "calm", "no", bar="line"),
+        True: Look("ERROR", "fault", "◆", "!", "alarm", "ERR", bar="full"),
+        False: Look("none", "ring", "○", "o", "calm", "no", bar="line"),
         None: UNKNOWN,
     },
     LINK: {
-        "CONNECTED": Look("connected", "bars", "≡", "=", "calm", "ok", bar="line"),
+        "CONNECTED": Look("connected", "bars", "≡", "=", "calm", "heard", bar="line"),
         "LOST": Look("LOST", "lost", "✗", "x", "warning", bar="full"),
-        "NEVER_SEEN": Look("not heard", "unheard", "◌", "o", "unknown", "none"),
+        "NEVER_SEEN": Look("not heard", "unheard", "◌", ":", "unknown", "none"),
     },
 }
 """Every value that JSON lines can have, by field. A field without a row has the words of `_plain`."""

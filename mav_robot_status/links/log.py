@@ -6,6 +6,7 @@ and have stamps of a clock that was set during the flight.
 
 from __future__ import annotations
 
+import io
 import os
 import select
 import stat
@@ -32,12 +33,8 @@ CHUNK: Final = 1 << 18
 """Bytes of one read."""
 PATIENCE: Final = 5.0
 """Seconds to wait until something is written to a pipe."""
-OTHER_FILES: Final = {
-    b"\xa3\x95": "a DataFlash log (.bin) of ArduPilot, which holds no MAVLink; replay the .tlog of the ground station",
-    b"ULog\x01\x12\x35": "a flight log (.ulg) of PX4, which holds no MAVLink; replay the .tlog of the ground station",
-    b"\x1f\x8b": "compressed with gzip; unpack it first: gunzip FILE",
-}
-"""Files that are taken for recorded logs, by their first bytes."""
+COMPRESSED: Final = {b"\x1f\x8b": "gzip", b"\xfd7zXZ\0": "xz"}
+"""Files that are unpacked while they are read, by their first bytes."""
 
 new = tuple.__new__  # makes a NamedTuple of a tuple in a third of the time of its constructor
 
@@ -159,28 +156,33 @@ class LogReader:
             raise self._unreadable(problem) from None
         weakref.finalize(self, os.close, self._descriptor)
         status = os.fstat(self._descriptor)
-        self._is_pipe = stat.S_ISFIFO(status.st_mode)
+        self.is_pipe = stat.S_ISFIFO(status.st_mode)
         if stat.S_ISDIR(status.st_mode):
             raise UsageError(f"cannot read the log {path!r}: Is a directory")
-        if not (self._is_pipe or stat.S_ISREG(status.st_mode)):
+        if not (self.is_pipe or stat.S_ISREG(status.st_mode)):
             raise UsageError(
                 f"cannot read the log {path!r}: it is not a file but a device; write for example flight.tlog"
             )
         self._size = status.st_size
         self.given = 0
         """Bytes that `blocks` has returned."""
+        self.trouble: str | None = None
+        """Why the log ended early."""
+        self._unpacked: io.BufferedIOBase | None = None
+        """Of a compressed file."""
         self.head = self._read(PATIENCE)
         """The first bytes of the log."""
         if not self.head:
             raise UsageError(f"the log {path!r} is empty")
-        for magic, what in OTHER_FILES.items():
-            if self.head.startswith(magic):
-                raise UsageError(f"{path} is {what}")
+        packed = next((kind for magic, kind in COMPRESSED.items() if self.head.startswith(magic)), None)
+        if packed is not None:
+            self._unpack(packed)
 
     @property
     def share(self) -> float:
         """The fraction of the log that `blocks` has returned, from 0 to 1; 0 for a pipe, whose size is not known."""
-        return min(self.given / self._size, 1.0) if self._size else 0.0
+        given = self.given if self._unpacked is None else os.lseek(self._descriptor, 0, os.SEEK_CUR)
+        return min(given / self._size, 1.0) if self._size else 0.0
 
     def blocks(self) -> Iterator[bytes]:
         """The whole log, in order. Iterate once."""
@@ -192,10 +194,38 @@ class LogReader:
                 yield block
             chunk = self._read(None)
 
+    def _unpack(self, kind: str) -> None:
+        """Read a compressed file from its start. Raises UsageError if it holds nothing."""
+        if self.is_pipe:
+            raise UsageError(f"{self.path} is a pipe with data of {kind}: unpack them before the pipe")
+        os.lseek(self._descriptor, 0, os.SEEK_SET)
+        file = io.FileIO(self._descriptor, closefd=False)
+        if kind == "xz":
+            import lzma
+
+            self._unpacked = lzma.LZMAFile(file)  # noqa: SIM115  # it lives as long as the reader
+        else:
+            import gzip
+
+            self._unpacked = gzip.GzipFile(fileobj=file)
+        self.head = self._read(None)
+        if not self.head:
+            raise UsageError(f"cannot read the log {self.path!r}: {self.trouble or f'{kind} of nothing'}")
+
+    def _read_unpacked(self, file: io.BufferedIOBase) -> bytes:
+        """The next bytes; none at the end, and where the compressed data is damaged."""
+        try:
+            return file.read(CHUNK)
+        except Exception as problem:  # gzip and lzma raise EOFError, OSError, and errors of their own
+            self.trouble = f"its compressed data is cut off or damaged ({problem})"
+            return b""
+
     def _read(self, seconds: float | None) -> bytes:
         """The next bytes; none at the end. Waits for the writer of a pipe, at most `seconds`."""
+        if self._unpacked is not None:
+            return self._read_unpacked(self._unpacked)
         try:
-            if self._is_pipe and not select.select([self._descriptor], [], [], seconds)[0]:
+            if self.is_pipe and not select.select([self._descriptor], [], [], seconds)[0]:
                 raise UsageError(f"cannot read the log {self.path!r}: it is a pipe, and nothing was written to it")
             return os.read(self._descriptor, CHUNK)
         except OSError as problem:

@@ -18,6 +18,8 @@ __all__ = ["KINDS", "Url", "help_text", "host_port", "parse"]
 _SCHEME = re.compile(r"([A-Za-z][\w+-]*):(?://)?(.*)", re.ASCII | re.DOTALL)
 _PORT_ALONE = re.compile(r":[0-9]+", re.ASCII)
 _GLUED = re.compile(r"([A-Za-z]+)([0-9]+(?:\.[0-9]+){3})", re.ASCII)
+LOG_NAMES = tuple(name + packed for name in (".tlog", ".bin", ".ulg", ".log") for packed in ("", ".gz", ".xz"))
+"""A connection that ends so is a recorded log, even if the file is missing."""
 NEARLY = 0.86
 """A host that is more similar to a scheme than this (1: equal) is taken for a misspelt scheme."""
 _BEHIND: Final = re.compile(r"[A-Za-z][\w+-]*:(?://)?(.*?)/?", re.ASCII | re.DOTALL)
@@ -72,7 +74,7 @@ def parse(text: str, baud: int | None = None) -> Url:
         if kind is None:
             raise UsageError(_what_it_is(text, scheme))
     if kind is None:
-        if os.path.isfile(text) or text.lower().endswith(".tlog"):
+        if os.path.isfile(text) or text.lower().endswith(LOG_NAMES):
             return LOG.url(text, text, baud)
         if text.startswith("/dev/") or _is_device(text):
             return SERIAL.url(text, text, baud)

@@ -9,24 +9,24 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Iterator
+from heapq import merge
 from typing import Final, NamedTuple
 
 from ..clock import Instant, rfc3339
 from ..interface import STATES, Publisher, PublisherContext, RobotStatusMsg
 from ..interface.options import Options
 from ..json_object import JsonMapping, JsonObject
+from ..language.states import UNHEARD
+from .alarms import Alarms
 from .json_lines import members
 
 MOST_HANDLES: Final = 4096
 MOST_MEMBERS: Final = 256
 """Members that follow a group."""
-MOST_TRANSITIONS: Final = 500
+MOST_TRANSITIONS: Final = 120
+"""Changes kept of one field of one robot, so that a busy field displaces no change of another."""
 KEPT: Final = 600.0
 """Seconds for which transitions are kept: the time span of a view."""
-
-
-UNHEARD: Final = "LINK_STALE"
-"""The inhibit of a robot, or of a member of a group, that is not heard."""
 
 
 class Transition(NamedTuple):
@@ -47,7 +47,7 @@ class Transition(NamedTuple):
 class Entry:
     """The latest status of one handle."""
 
-    __slots__ = ("at", "began", "heartbeat_age", "last", "line", "lines", "stamp", "transitions", "version")
+    __slots__ = ("_kept", "at", "began", "heartbeat_age", "last", "line", "lines", "stamp", "version")
 
     def __init__(self, now: float) -> None:
         self.began = now
@@ -64,7 +64,26 @@ class Entry:
         """When (monotonic seconds) the latest line arrived."""
         self.version = 0
         """The version of the board at the last change of this entry."""
-        self.transitions: deque[Transition] = deque(maxlen=MOST_TRANSITIONS)
+        self._kept: dict[str, deque[Transition]] = {}
+        """The changes by name, the oldest first."""
+
+    @property
+    def transitions(self) -> list[Transition]:
+        """The kept changes, the oldest first."""
+        return list(merge(*self._kept.values(), key=_at))
+
+    def kept_since(self) -> dict[str, float]:
+        """From when the value of each field is known, monotonic seconds."""
+        return {name: kept[0].at if len(kept) == MOST_TRANSITIONS else self.began for name, kept in self._kept.items()}
+
+    def keep(self, new: Transition) -> None:
+        """Keep a change."""
+        if new.name not in self._kept:
+            self._kept[new.name] = deque(maxlen=MOST_TRANSITIONS)
+        self._kept[new.name].append(new)
+        for kept in self._kept.values():
+            while kept and new.at - kept[0].at > KEPT:
+                kept.popleft()
 
     def whole(self) -> JsonObject:
         """The whole line, as `--format native` writes it. `seq` counts the lines so far."""
@@ -81,6 +100,7 @@ class Board:
         """Counts the changes of all entries."""
         self.refused = 0
         """Lines of handles beyond MOST_HANDLES."""
+        self.alarms = Alarms()
         self._seen: dict[str, tuple[object, object]] = {}
 
     def __iter__(self) -> Iterator[Entry]:
@@ -131,14 +151,25 @@ class Board:
         self._seen.pop(handle, None)
         if self.entries.pop(handle, None) is not None:
             self.version += 1
+            self.alarms.forget(handle, self.version)
+
+    def acknowledge(self, handle: str | None, now: Instant) -> None:
+        """A person has seen the alarms of one robot, or of all."""
+        if self.alarms.acknowledge(handle, rfc3339(now.unix_us), self.version + 1):
+            self.version += 1
+
+    def members(self, line: JsonMapping) -> dict[str, Entry]:
+        """The entries of the members of a group, as far as there are any; of a single robot empty."""
+        names = line.get("members")
+        if not isinstance(names, list):
+            return {}
+        return {n: self.entries[n] for n in names[:MOST_MEMBERS] if isinstance(n, str) and n in self.entries}
 
     def _nested(self, ordered: list[Entry]) -> Iterator[Entry]:
         for entry in ordered:
-            members = entry.line.get("members")
-            if isinstance(members, list) and members:
+            if isinstance(entry.line.get("members"), list) and entry.line["members"]:
                 yield entry
-                names = (name for name in members[:MOST_MEMBERS] if isinstance(name, str))
-                yield from (self.entries[name] for name in names if name in self.entries)
+                yield from self.members(entry.line).values()
         yield from ordered
 
     def _entry(self, handle: str, now: float) -> Entry | None:
@@ -152,19 +183,17 @@ class Board:
         return entry
 
     def _change(self, entry: Entry, line: JsonMapping, stamp: str, now: float) -> None:
-        transitions = entry.transitions
         known = entry.line
         if not _is_connected(known):
             known = entry.last or known
         elif not _is_connected(line):
             entry.last = entry.whole()
         for name, value, before in (*_changes(entry.line, line), *_cause_changes(known, line)):
-            transitions.append(Transition(now, stamp, name, value, before))
-        while transitions and now - transitions[0].at > KEPT:
-            transitions.popleft()
+            entry.keep(Transition(now, stamp, name, value, before))
         entry.line = line
         self.version += 1
         entry.version = self.version
+        self.alarms.take(str(line["handle"]), line, stamp, self.version)
 
 
 class BoardPublisher(Publisher):
@@ -197,6 +226,10 @@ class BoardPublisher(Publisher):
         """Remove a handle that is gone from the board."""
         with self.lock:
             self.board.forget(handle)
+
+
+def _at(transition: Transition) -> float:
+    return transition.at
 
 
 def _order(entry: Entry) -> tuple[bool, int, int, str]:

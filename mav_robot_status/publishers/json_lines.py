@@ -45,7 +45,8 @@ def native_body(handle: str, status: RobotStatus, detail: Detail) -> str:
 def native(msg: RobotStatusMsg, seq: int, body: str) -> str:
     """The native line."""
     age = "null" if msg.heartbeat_age is None else f"{max(0.0, msg.heartbeat_age):.3f}"
-    return f'{{"stamp": "{rfc3339(msg.unix_us)}", "seq": {seq}, {body}, "heartbeat_age": {age}}}}}\n'
+    boot = "" if msg.boot_s is None else f'"boot_s": {msg.boot_s:.3f}, '
+    return f'{{"stamp": "{rfc3339(msg.unix_us)}", {boot}"seq": {seq}, {body}, "heartbeat_age": {age}}}}}\n'
 
 
 def ros1(msg: RobotStatusMsg, seq: int) -> str:
@@ -93,6 +94,26 @@ class JsonOptions(Options):
     changes_only: Annotated[bool, Option("JSON lines only on change", "--changes-only")] = False
 
 
+class Bodies:
+    """The text of each handle's latest status: most lines repeat the line before."""
+
+    def __init__(self) -> None:
+        self._latest: dict[str, tuple[RobotStatus, Detail, str]] = {}
+
+    def of(self, msg: RobotStatusMsg) -> str:
+        """`native_body` of a message."""
+        cached = self._latest.get(msg.handle)
+        if cached is not None and cached[0] is msg.status and cached[1] is msg.detail:
+            return cached[2]
+        body = native_body(msg.handle, msg.status, msg.detail)
+        self._latest[msg.handle] = (msg.status, msg.detail, body)
+        return body
+
+    def forget(self, handle: str) -> None:
+        """Release what belongs to a handle that is gone."""
+        self._latest.pop(handle, None)
+
+
 class JsonLinesPublisher:
     """Writes lines to a file or to standard output. A slow reader loses lines; it never blocks the gateway.
 
@@ -109,7 +130,7 @@ class JsonLinesPublisher:
         output = PatientLineOutput if context.patient else LineOutput
         self._output: LineOutput | PatientLineOutput = output(options.path, context.stdout)
         self._seq: dict[str, int] = {}
-        self._bodies: dict[str, tuple[RobotStatus, Detail, str]] = {}
+        self._bodies = Bodies()
 
     def busy(self) -> bool:
         """True while an earlier line is written in part, or the pipe is full."""
@@ -130,7 +151,7 @@ class JsonLinesPublisher:
         seq = self._seq.get(msg.handle, 0)
         self._seq[msg.handle] = seq + 1
         other = ROS_FORMATS.get(self._format)
-        line = native(msg, seq, self._body(msg)) if other is None else other(msg, seq)
+        line = native(msg, seq, self._bodies.of(msg)) if other is None else other(msg, seq)
         self._output.write(msg.handle, line.encode())
 
     def service(self, now: Instant) -> float | None:
@@ -140,16 +161,8 @@ class JsonLinesPublisher:
     def forget(self, handle: str) -> None:
         """Release what belongs to a handle that is gone."""
         self._seq.pop(handle, None)
-        self._bodies.pop(handle, None)
+        self._bodies.forget(handle)
 
     def close(self) -> None:
         """Write the rest of a line if the pipe has room, and close the file."""
         self._output.close()
-
-    def _body(self, msg: RobotStatusMsg) -> str:
-        cached = self._bodies.get(msg.handle)
-        if cached is not None and cached[0] is msg.status and cached[1] is msg.detail:
-            return cached[2]
-        body = native_body(msg.handle, msg.status, msg.detail)
-        self._bodies[msg.handle] = (msg.status, msg.detail, body)
-        return body

@@ -8,25 +8,40 @@ Autopilots with the same system id have one status: what they do not agree on is
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from operator import attrgetter
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
 
-from ..interface import FIELDS, STATES, TRI_STATES, Audience, RobotMode, RobotStatus, RobotStatusMsg, TriState
+from ..interface import FIELDS, STATES, Audience, RobotMode, RobotStatus, RobotStatusMsg, TriState
+from ..json_object import JsonMapping
+from ..language import State, Trouble, state_of, troubles
+from ..language.states import EMERGENCY_STOP, LOST, UNKNOWN
 from ..mavlink.definitions import NamedValueInt, Statustext
+from .json_lines import members
 from .rate_limiter import RateLimitedPublisher, Schedule
 
+Key = tuple[str, str, str]
+
 VALUE_INTERVAL: Final = 2.0  # s
-TEXT_INTERVAL: Final = 2.0  # s, the minimum
-WARNING, INFO = 4, 6  # MAV_SEVERITY
+TEXT_INTERVAL: Final = 2.0  # s, the minimum, but for a text that is worse than the last one
+INFO: Final = 6  # MAV_SEVERITY
 LONGEST_TEXT: Final = 50  # bytes, of STATUSTEXT
-WORDS: Final = {TriState.UNKNOWN: "?", TriState.FALSE: "0", TriState.TRUE: "1"}
+MODES: Final = {
+    RobotMode.AUTO: "Mode AUTO: a program drives",
+    RobotMode.MANUAL: "Mode MANUAL: a pilot drives",
+    RobotMode.UNKNOWN: "Mode UNKNOWN: a pilot or a program drives",
+}
 PACKED: Final = tuple((field.name, field.row.bits) for field in FIELDS if field.row.bits is not None)
 """The fields in RS_STATE, each with the lower of its two bits."""
-TEXT: Final = "RS: {mode} drv={drives_powered} mot={in_motion} poss={motion_possible} es={e_stopped} err={error_code}"
-"""The STATUSTEXT. It has 50 characters, which leaves no room for more fields."""
-ANNOUNCED: Final = attrgetter(*(field.name for field in FIELDS if field.row.announced))
-"""The values whose change sends a STATUSTEXT."""
+
+
+class Text(NamedTuple):
+    """A STATUSTEXT that is to be sent, and what the ground station knows after it."""
+
+    severity: int
+    text: str
+    """At most LONGEST_TEXT bytes are sent."""
+    mode: RobotMode | None
+    known: Mapping[Key, Trouble]
 
 
 def packed(status: RobotStatus) -> int:
@@ -37,12 +52,52 @@ def packed(status: RobotStatus) -> int:
     return sum((getattr(status, name) + 1) << bits for name, bits in PACKED)
 
 
-def text_of(status: RobotStatus) -> str:
-    """`RS: AUTO drv=1 mot=1 poss=1 es=? err=0`; err is the error code, `?` if it is unknown whether there is one."""
-    words = {field.name: WORDS[getattr(status, field.name)] for field in TRI_STATES}
-    error = "?" if status.in_error is TriState.UNKNOWN else status.error_code
-    text = TEXT.format(**words, mode=RobotMode(status.mode).name, error_code=error)
-    return text[:LONGEST_TEXT]
+def texts(
+    line: JsonMapping, mode: RobotMode, before: RobotMode | None, known: Mapping[Key, Trouble], age: float | None
+) -> list[Text]:
+    """What a ground station has to be told, the worst first: one text for each event since it was told `known`.
+
+    `before` is the mode of which it was told; None: it was told nothing. `age` is that of the last heartbeat, seconds.
+    """
+    state, now = state_of(line), {one.key: one for one in troubles(line)}
+    if state is UNKNOWN:
+        now["", "", ""] = Trouble(UNKNOWN, {}, "whether it can move is not known")
+    if state is LOST:  # it ends nothing, and its mode is not news
+        now, mode = {**known, **now}, mode if before is None else before
+    found = [
+        Text(one.state.severity, _begins(one, age), before, {**known, key: one})
+        for key, one in now.items()
+        if key not in known
+    ]
+    if mode is not before:
+        found.append(Text(INFO, MODES[mode], mode, known))
+    for key, one in known.items():
+        if key not in now:
+            rest = {name: other for name, other in known.items() if name != key}
+            found.append(Text(INFO, _ends(one, state, line), before, rest))
+    return sorted(found, key=lambda one: one.severity)
+
+
+def _begins(one: Trouble, age: float | None) -> str:
+    if one.state is EMERGENCY_STOP:
+        return f"{one.state.word} engaged"
+    if one.state is LOST and age is not None:
+        return f"{one.state.word}: nothing heard for {age:.0f} s"
+    return f"{one.state.word}: {one.why}" if one.why else one.state.word
+
+
+def _ends(one: Trouble, state: State, line: JsonMapping) -> str:
+    if one.state is EMERGENCY_STOP:
+        released = line.get("e_stopped") is False
+        return "Emergency stop released" if released else "Emergency stop: unknown whether it is released"
+    if one.state is LOST:
+        return f"Heard again: {state.word}"
+    return f"{one.state.word.capitalize()} ended: {one.why}" if one.why else f"{one.state.word.capitalize()} ended"
+
+
+def cut(text: str) -> bytes:
+    """At most LONGEST_TEXT bytes of a text: whole characters."""
+    return text.encode()[:LONGEST_TEXT].decode(errors="ignore").encode()
 
 
 def agreed(statuses: Sequence[RobotStatus]) -> RobotStatus:
@@ -56,19 +111,24 @@ def agreed(statuses: Sequence[RobotStatus]) -> RobotStatus:
 
 
 class _Sent:
-    """The last values and text about one handle, sent to one audience."""
+    """The last values about one handle, and what one audience was told of it."""
 
-    __slots__ = ("status", "text_at", "values")
+    __slots__ = ("known", "mode", "msg", "severity", "text_at", "values")
 
     def __init__(self) -> None:
         self.values = Schedule()
-        self.status: RobotStatus | None = None
-        """The status in the last text."""
-        self.text_at = -math.inf
+        self.mode: RobotMode | None = None
+        """The mode of which it was told."""
+        self.known: Mapping[Key, Trouble] = {}
+        """The troubles of which it was told."""
+        self.msg: RobotStatusMsg | None = None
+        """The last message of which everything was told."""
+        self.text_at, self.severity = -math.inf, INFO
+        """When the last text was sent, and how severe it was."""
 
 
 class NamedValuePublisher(RateLimitedPublisher[_Sent]):
-    """RS_STATE and RS_ERROR at 0.5 Hz and on change; a text when an announced field changes."""
+    """RS_STATE and RS_ERROR at 0.5 Hz and on change; a text for each event."""
 
     name = "mirror"
     state_type = _Sent
@@ -104,13 +164,19 @@ class NamedValuePublisher(RateLimitedPublisher[_Sent]):
         return math.inf
 
     def _text(self, msg: RobotStatusMsg, system: int, audience: Audience, sent: _Sent, now: float) -> float:
-        status, before = msg.status, sent.status
-        if before is not None and ANNOUNCED(status) == ANNOUNCED(before):
+        settled = sent.msg
+        if settled is not None and settled.status == msg.status and settled.detail == msg.detail:
             return math.inf
-        if now < sent.text_at + TEXT_INTERVAL:
-            return sent.text_at + TEXT_INTERVAL
-        fails = status.in_error is TriState.TRUE and (before is None or before.in_error is not TriState.TRUE)
-        sent.status, sent.text_at = status, now
-        text = Statustext(WARNING if fails else INFO, text_of(status).encode(), 0, 0)
-        self._port.send(text, system, audience)
+        line = members(msg.handle, msg.status, msg.detail)
+        if state_of(line) is not UNKNOWN:  # what is known again is told by what it is
+            sent.known = {key: one for key, one in sent.known.items() if one.state is not UNKNOWN}
+        found = texts(line, msg.status.mode, sent.mode, sent.known, msg.heartbeat_age)
+        while found:
+            first = found[0]
+            if now < sent.text_at + TEXT_INTERVAL and first.severity >= sent.severity:
+                return sent.text_at + TEXT_INTERVAL
+            sent.mode, sent.known, sent.text_at, sent.severity = first.mode, first.known, now, first.severity
+            self._port.send(Statustext(first.severity, cut(first.text), 0, 0), system, audience)
+            found = texts(line, msg.status.mode, sent.mode, sent.known, msg.heartbeat_age)
+        sent.msg = msg
         return math.inf

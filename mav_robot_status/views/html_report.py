@@ -12,7 +12,7 @@ import html
 import json
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from itertools import pairwise
 from typing import Final
@@ -22,9 +22,13 @@ from ..errors import LinkError, UsageError
 from ..interface import STATES, Kind, LinkState, RobotMode
 from ..json_object import JsonObject
 from ..language import LOOKS, remedy, style_sheet
+from ..language.shapes import drawing
+from ..language.states import UNSURE
 from ..language.values import NO, UNKNOWN, YES
+from ..streams import visible
 from .timeline import TRACKS, Reason, Span, Timeline, VehicleTimeline
 from .totals import ReasonTotal, Totals, totals
+from .verdict import verdict
 
 WORDS: Final = {"TRUE": True, "FALSE": False, "UNKNOWN": None}
 """The JSON of a TriState."""
@@ -37,8 +41,6 @@ VALUES: Final[dict[str, tuple[str, ...]]] = {
 """The values of each track. The totals list all of them, even those that never occurred."""
 LOOKS_OF: Final = {**LOOKS, "armed": {True: YES, False: NO, None: UNKNOWN}}
 """The looks of each track. A flight mode has its own name."""
-UNCERTAIN: Final = ("LINK_STALE", "SYS_STATUS_MISSING", "STOP_UNCERTAIN", "SENDER_UNCERTAIN", "HEARTBEAT_LATE")
-"""The inhibits that say why something is unknown, not why motion is not possible."""
 NOT_READY: Final = "not ready: "
 """Before the member and its reason, on the page."""
 ESCAPES: Final = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&"})
@@ -67,6 +69,7 @@ def _vehicle(timeline: Timeline, vehicle: VehicleTimeline) -> JsonObject:
             **({} if vehicle.name is None else {"name": vehicle.name}),
         },
         **({"members": list(vehicle.members)} if vehicle.members else {}),
+        "verdict": verdict(timeline, vehicle).members(),
         "totals": {
             "seconds": _seconds(whole.watched),
             "arm_cycles": len(whole.arm_cycles),
@@ -148,6 +151,7 @@ def as_html(timelines: Sequence[Timeline], made_by: str) -> str:
     )
     parts = {
         "policy": policy,
+        "verdicts": "\n".join(_verdicts(timelines)),
         "title": html.escape(", ".join(timeline.name for timeline in timelines)),
         "style": style,
         "script": script,
@@ -160,6 +164,20 @@ def as_html(timelines: Sequence[Timeline], made_by: str) -> str:
         name, _, following = piece.partition("}}")
         page += parts[name] + following
     return page
+
+
+def _verdicts(timelines: Sequence[Timeline]) -> Iterator[str]:
+    """The verdict on each vehicle. With several, each begins with its name."""
+    found = [(timeline, vehicle) for timeline in timelines for vehicle in timeline.vehicles]
+    for timeline, vehicle in found:
+        said = verdict(timeline, vehicle)
+        names = [timeline.name] * (len(timelines) > 1) + [_title(vehicle)] * (len(found) > 1)
+        name = f"<b>{html.escape(visible(' '.join(names)))}</b> " if names else ""
+        yield (
+            f'<div class="{said.state.tone}">{drawing(said.state.shape)}'
+            f"<p>{name}<strong>{html.escape(said.state.word)}</strong></p>"
+            f"<p>{html.escape(visible(said.sentence))}</p></div>"
+        )
 
 
 def _looks() -> dict[str, dict[str, dict[str, str]]]:
@@ -283,7 +301,7 @@ def _total(total: ReasonTotal) -> JsonObject:
 
 
 def _inhibit(total: ReasonTotal) -> JsonObject:
-    if total.name in UNCERTAIN:
+    if total.name in UNSURE:
         return {**_total(total), "kind": "unknown", "tone": "unknown"}
     tone = "warning" if remedy({"name": total.name}).person else "calm"
     return {**_total(total), "kind": "inhibit", "tone": tone}

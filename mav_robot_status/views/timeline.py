@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 from ..clock import Instant
 from ..interface import STATES, Detail, Evidence, IndustrialRobotStatusHandle, LinkState, RobotStatus, TriState
 
-UNTOLD: Final = {"HEARTBEAT_LATE", "SENDER_UNCERTAIN"}
+UNTOLD: Final = {"HEARTBEAT_LATE", "SENDER_UNCERTAIN", "LOG_GAP"}
 """Inhibits with which nobody knows whether the autopilot is armed."""
 TRACKS: Final = ("link", "flight_mode", "armed", *(field.name for field in STATES))
 """The tracks of each vehicle. A track has one value at a time."""

@@ -42,6 +42,8 @@ def place(tmp_path: pathlib.Path, flight_log: pathlib.Path, monkeypatch: pytest.
     """The folder, as the current one, with the commands of this Python's environment on the path."""
     shutil.copy(flight_log, tmp_path)
     shutil.copytree(ROOT / "config", tmp_path / "config")
+    for log in (ROOT / "tests" / "recorded" / "onboard").glob("rover-*"):
+        shutil.copy(log, tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))

@@ -49,7 +49,7 @@ from .documents import DOCUMENTS, ROOT, Block, blocks, links, name_of, prose
 SCHEMA = ROOT / "mav_robot_status" / "data" / "robot_status.schema.json"
 SETUP = "python3 -m venv .venv && .venv/bin/pip install -q "
 TESTS = SETUP + "-e '.[dev]' && .venv/bin/python -m pytest"
-DEMO = SETUP + ". && .venv/bin/mav-robot-status demo"
+DEMO = SETUP + "'.[watch,web]' && .venv/bin/mav-robot-status demo"
 FAKES = "python -m mav_robot_status.testing.mobile_manipulator"
 GENERATORS = {
     ".venv/bin/python dialects/generate.py": ".",

@@ -33,8 +33,6 @@ from mav_robot_status.publishers.json_lines import native_body
 
 from .documents import DOCUMENTS, ROOT, blocks, links, name_of, prose, table
 
-WHOLE = ("gateway", "views", "hardware", "publishers", "interface")
-"""Folders whose every part is in the picture of the architecture page."""
 OTHER_TOOLS = {"--dialect", "--check", "--reference", "--packages-select"}  # of MAVProxy, ruff, chown and colcon
 NO_KEYS = ("controllers", "interfaces", "names", "without_effect")
 """Fields of a configuration that are no keys: other keys at the top, parts of two lists, keys of former versions."""
@@ -94,7 +92,7 @@ def test_the_parameters_of_a_controller_with_their_defaults() -> None:
 def test_the_members_of_a_line() -> None:
     body = native_body("", RobotStatus(), Detail(members=("arm",)))
     members = re.findall(r'"(\w+)": ', re.sub(r"\{[^}]*\}?|\[[^]]*\]", "{}", body))
-    assert [row[0] for row in table("docs/reference/json.md", "member")] == ["stamp", "seq", *members]
+    assert [row[0] for row in table("docs/reference/json.md", "member")] == ["stamp", "boot_s", "seq", *members]
 
 
 @pytest.mark.parametrize(
@@ -201,30 +199,24 @@ def test_every_path_that_is_mentioned_exists() -> None:
             assert (ROOT / path).exists(), f"{name_of(document)}: {path}"
 
 
-@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "docs/architecture.md"])
-def test_the_places_where_a_change_goes_exist(page: str) -> None:
-    rows = [line for line in (ROOT / page).read_text().splitlines() if line.startswith("|")]
+def test_the_seven_places_where_a_change_goes_exist() -> None:
+    rows = table("CONTRIBUTING.md", "a new ...")
+    assert len(rows) == 7
     folders = "hardware|links|publishers|interface|gateway|testing|mavlink|data"
-    places = re.findall(rf"`((?:{folders})/[^`<]*)", "".join(rows))
-    assert places
-    for place in places:
-        assert (ROOT / "mav_robot_status" / place).exists(), place
+    for row in rows:
+        places = re.findall(rf"(?<![/\w])(?:{folders})/[^\s,;<]*", row[1])
+        assert places, row[0]
+        for place in places:
+            assert (ROOT / "mav_robot_status" / place).exists(), place
 
 
-@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "docs/architecture.md"])
-def test_the_tables_that_a_change_extends_exist_in_the_modules_that_are_named(page: str) -> None:
-    rows = [line for line in (ROOT / page).read_text().splitlines() if line.startswith("|")]
-    named = re.findall(r"`([A-Z]\w+)` in `((?:hardware|links|gateway|interface)/[^`<]*\.py)`", "".join(rows))
-    assert {"KINDS", "OURS", "RobotStatus"} <= {name for name, _ in named}
+def test_the_tables_that_a_change_extends_exist_in_the_modules_that_are_named() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    named = re.findall(r"`([A-Z]\w+)` in `((?:hardware|links|gateway|interface)/[^`<]*\.py)`", text)
+    assert {"KINDS", "OURS", "RobotStatus", "CAUSES"} <= {name for name, _ in named}
     for name, module in named:
         code = (ROOT / "mav_robot_status" / module).read_text()
-        assert re.search(rf"^(class )?{name}\b", code, re.MULTILINE), f"{page}: {name} in {module}"
-
-
-def test_both_pages_give_the_same_seven_places() -> None:
-    short, long = ([row[0] for row in table(page, "a new ...")] for page in ("docs/architecture.md", "CONTRIBUTING.md"))
-    assert len(short) == 7
-    assert long == short
+        assert re.search(rf"^(class )?{name}\b", code, re.MULTILINE), f"{name} in {module}"
 
 
 @pytest.mark.parametrize("folder", ["", "decisions", "semantics"])
@@ -238,42 +230,39 @@ def test_an_index_lists_every_page_of_its_folder(folder: str) -> None:
     assert sorted(pages - listed) == []
 
 
-def test_the_picture_of_the_architecture_shows_every_part() -> None:
-    picture = next(block for block in blocks("text") if block.document.name == "architecture.md").code
-    folders = [ROOT / "mav_robot_status"]
-    top = set()
-    drawn: dict[str, str] = {}
-    for line in picture.splitlines()[1:]:
-        found = re.match(r"((?:[│ ]   )*)[├└]── (\S+)", line)
+def test_the_picture_of_the_architecture_shows_every_room_and_no_other() -> None:
+    package = ROOT / "mav_robot_status"
+    picture = next(
+        b for b in blocks("text") if b.document.name == "architecture.md" and b.code.startswith(package.name)
+    )
+    path = [package]
+    drawn = set()
+    for line in picture.code.splitlines()[1:]:
+        found = re.match(r"((?:[│ ]   )*)[├└]── (\S+)/ +\S", line)
         assert found, line
         depth = len(found[1]) // 4
-        path = folders[depth] / found[2]
-        assert path.exists(), line
-        if depth == 0:
-            top.add(found[2].rstrip("/"))
-        if path.is_dir():
-            folders[depth + 1 :] = [path]
-        for folder in folders[1:]:
-            drawn[folder.name] = drawn.get(folder.name, "") + line
-        for file in re.findall(r"\b\w+\.py\b", line.partition(found[2])[2]):
-            assert any((place / file).exists() for place in (path, path.parent)), line
-    there_is = {p.name for p in (ROOT / "mav_robot_status").iterdir() if p.suffix in ("", ".py") and p.name[0] != "_"}
-    assert top == there_is
-    for name in WHOLE:
-        parts = {p.name for p in (ROOT / "mav_robot_status" / name).iterdir() if p.name[0] != "_"} - {"assets"}
-        assert {part for part in parts if part not in drawn[name]} == set(), name
+        path[depth + 1 :] = [path[depth] / found[2]]
+        drawn.add(path[-1])
+    rooms = {p.parent for p in package.rglob("__init__.py")} - {package}
+    small = {package / "testing" / name for name in ("conformance", "scenarios")}
+    assert drawn == rooms - small | {package / "data"}
+
+
+def test_the_rooms_are_drawn_in_the_order_of_their_imports() -> None:
+    text = (ROOT / "pyproject.toml").read_text()
+    layers = text.partition("layers = [")[2].partition("]")[0]
+    order = [
+        name for name in re.findall(r"mav_robot_status\.(\w+)", layers) if (ROOT / "mav_robot_status" / name).is_dir()
+    ]
+    picture = next(b for b in blocks("text") if b.code.startswith("mav_robot_status/"))
+    assert re.findall(r"^[├└]── (\w+)/", picture.code, re.MULTILINE) == [*order, "data"]
 
 
 def test_every_source_that_the_semantics_cite_is_listed() -> None:
-    listed = {row[0] for row in table("docs/semantics/sources.md", "n")}
+    listed = set(re.findall(r"^- \*\*(S\d+)\*\* ", (ROOT / "docs/semantics/sources.md").read_text(), re.MULTILINE))
     for page in (ROOT / "docs" / "semantics").glob("*.md"):
         cited = set(re.findall(r"\[(S\d+)b?c?\]", page.read_text()))
         assert sorted(cited - listed) == [], name_of(page)
-
-
-def test_every_sequence_of_the_semantics_has_a_test_and_every_test_a_sequence() -> None:
-    tests = (ROOT / "tests" / "unit" / "hardware" / "mavlink" / "test_sequences.py").read_text()
-    assert re.findall(r'"""(Q\d\d)', tests) == [row[0] for row in table("docs/semantics/sequences.md", "#")]
 
 
 def test_every_anchor_of_a_link_is_a_heading() -> None:

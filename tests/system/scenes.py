@@ -87,6 +87,29 @@ def failing(handle: str, system: int = 1) -> Line:
     return line(handle, system, inhibits=[inhibit("PREARM_FAILING", "GPS 1: Bad fix"), inhibit("DISARMED")])
 
 
+def armable(handle: str, system: int = 1) -> Line:
+    """Disarmed, and its checks pass."""
+    return line(handle, system, vehicle=vehicle("HOLD", can_arm=True))
+
+
+def crashed(handle: str, system: int = 1) -> Line:
+    """It has crashed, and disarmed."""
+    found = error(4001, "CRASH", "Crash: Going to HOLD")
+    return parked(handle, system) | {"in_error": True, "error_code": 4001, "errors": [found]}
+
+
+def doubled(handle: str, system: int = 1) -> Line:
+    """Two autopilots have its system id."""
+    found = error(9002, "SYSTEM_ID_CONFLICT", None)
+    return ready(handle, system) | {"in_error": True, "error_code": 9002, "errors": [found]}
+
+
+def faulty(handle: str, system: int = 1) -> Line:
+    """Armed with an error."""
+    found = error(2003, "BATTERY_LOW", "Battery 1 is low 10.61V")
+    return ready(handle, system) | {"in_error": True, "error_code": 2003, "errors": [found]}
+
+
 def stopped(handle: str, system: int = 1) -> Line:
     """Its emergency stop is engaged."""
     return line(
@@ -130,8 +153,7 @@ def group(handle: str = "robot", system: int = 1) -> list[Line]:
     """A rover with an arm whose emergency stop is engaged."""
     base, arm = ready("base", system), stopped("arm", system) | {"component": 2, "mode": "AUTO"}
     arm["vehicle"] = vehicle(None, autopilot="UNIVERSAL_ROBOTS", type="UR5E")
-    whole = ready(handle, system) | {"component": 192, "members": ["base", "arm"], "e_stopped": True}
-    whole |= {"motion_possible": False, "inhibits": [inhibit("E_STOPPED", "Motor Emergency Stop", handle="arm")]}
+    whole = ready(handle, system) | {"component": 192, "members": ["base", "arm"], "e_stopped": None}
     return [whole, base, arm]
 
 
@@ -200,15 +222,5 @@ class Page:
         assert done.wait(allow(SOON))
 
 
-STATES = (
-    parked,
-    ready,
-    moving,
-    failing,
-    stopped,
-    in_error,
-    unsure,
-    lost,
-    unheard,
-)
-"""Every state of one robot, as a function of its name."""
+STATES = (stopped, crashed, doubled, faulty, lost, failing, unsure, unheard, ready, moving, armable, parked)
+"""Every state of one robot, as a function of its name, in the order of the table."""

@@ -225,7 +225,7 @@ def test_explain_names_the_member_that_decided(arm: FakeArm) -> None:
     assert done.returncode == 0, done.stderr
     found = {one["handle"]: one["fields"] for one in map(json.loads, done.stdout.splitlines())}
     assert found["robot"]["e_stopped"]["value"] is False
-    assert found["robot"]["e_stopped"]["rule"] == "arm: emergency stop bits"
+    assert found["robot"]["e_stopped"]["rule"] == "arm: emergency stop bits, and no other safety_status beside them"
     assert found["arm"]["e_stopped"]["source"] == "safety_status_bits 0x001"
 
 

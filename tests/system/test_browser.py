@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -114,9 +115,9 @@ def test_nothing_is_known_on_the_page_until_a_restarted_gateway_answers(
     assert "NOT CONNECTED" in browser.text("header")
     assert browser.text("#banner").startswith("No connection to the gateway since ")
     assert browser.ask(f"return {WORD}") == "UNKNOWN"
-    assert "It may be moving. Last known: CANNOT MOVE." in browser.text("#verdict")
+    assert ": PARKED. It may be moving." in browser.text("#verdict")
     assert browser.ask(f"return {tile('Drives')}") == "unknown"
-    assert "Last known: off" in browser.text("#tiles")
+    assert "Last heard: off" in browser.text("#tiles")
     again = gateway("udpin:127.0.0.1:0", *page)
     rover.to = again.address
     rover.beat(armed=True)
@@ -169,7 +170,7 @@ def test_the_reasons_of_the_fields_end_when_nothing_arrives_from_the_gateway(
 def test_a_robot_that_the_gateway_no_longer_has_is_not_shown(browser: Browser, page: Page) -> None:
     page.only([scenes.parked("rover"), scenes.parked("boat")])
     browser.driver.get(f"{page.url}#/rover")
-    browser.wait(f"{WORD} === 'CANNOT MOVE'")
+    browser.wait(f"{WORD} === 'PARKED'")
     page.only([scenes.parked("boat")])
     browser.wait("document.querySelector('#who').innerText === 'The gateway has no such robot.'")
     assert browser.text("#verdict") == browser.text("#tiles") == browser.text("#why") == ""
@@ -181,20 +182,20 @@ def test_a_lost_link_says_since_when_and_what_was_last_known(
     gate = gateway(*PAGE)
     rover = wire(gate.address).beating()
     browser.driver.get(f"{url(gate)}/#/{HANDLE}")
-    browser.wait(f"{WORD} === 'CANNOT MOVE'")
+    browser.wait(f"{WORD} === 'PARKED'")
     rover.beating(False)
     browser.wait(f"{WORD} === 'LOST'")
-    assert "Unknown since " in browser.text("#verdict")
-    assert "It may be moving. Last known: MANUAL" in browser.text("#verdict")
+    assert "Last heard " in browser.text("#verdict")
+    assert ": disarmed, MANUAL. It may be moving." in browser.text("#verdict")
     assert "why this is unknown" in browser.text("#causes").lower()
     assert "motion" not in browser.text("#causes").lower()
     assert browser.text("#tiles").count("unknown") == 6
-    assert "Last known: off" in browser.text("#tiles")
+    assert "Last heard: off" in browser.text("#tiles")
     struck = "[...document.querySelectorAll('*')].map((one) => getComputedStyle(one).textDecorationLine)"
     assert "line-through" not in browser.ask(f"return {struck}")
     browser.driver.get(f"{url(gate)}/#?all")
     browser.wait("document.querySelector('#rows .state')?.innerText === 'LOST'")
-    assert "Unknown since " in browser.text("#rows .why-cell")
+    assert "Last heard " in browser.text("#rows .why-cell")
 
 
 def test_a_loss_ends_no_error_in_the_list_of_changes(browser: Browser, page: Page) -> None:
@@ -221,9 +222,9 @@ def test_a_robot_has_its_explanation_bands_and_changes(
         "[...document.querySelectorAll('#why tr')]"
         ".some((row) => /Drives powered\\s+POWERED\\s+armed/.test(row.innerText))"
     )
-    assert browser.ask("return document.querySelectorAll('#bands svg').length") == 7
+    assert browser.ask("return document.querySelectorAll('#bands [role=img]').length") == 7
     labels = browser.ask(
-        "return [...document.querySelectorAll('#bands svg')].map((svg) => svg.getAttribute('aria-label'))"
+        "return [...document.querySelectorAll('#bands [role=img]')].map((svg) => svg.getAttribute('aria-label'))"
     )
     drives = next(label for label in labels if label.startswith("Drives powered"))
     assert "off from " in drives
@@ -237,7 +238,7 @@ def test_the_only_robot_is_shown_at_once_and_the_list_is_one_click_away(browser:
     browser.driver.find_element("css selector", ".back a").click()
     browser.wait(f"document.querySelector('#vehicle').hidden && {ORDER}.length === 1")
     browser.driver.find_element("css selector", "#rows a").click()
-    browser.wait(f"!document.querySelector('#vehicle').hidden && {WORD} === 'CANNOT MOVE'")
+    browser.wait(f"!document.querySelector('#vehicle').hidden && {WORD} === 'PARKED'")
     look_at(browser, page, [scenes.parked("mower")])
     page.put(scenes.parked("tug", 2))
     browser.wait(f"{ORDER}.length === 2")
@@ -245,8 +246,8 @@ def test_the_only_robot_is_shown_at_once_and_the_list_is_one_click_away(browser:
 
 def test_a_headline_has_its_reason_and_a_next_step_that_opens_the_help(browser: Browser, page: Page) -> None:
     look_at(browser, page, [scenes.failing("mower")])
-    assert browser.ask(f"return {WORD}") == "CANNOT MOVE"
-    assert "The autopilot says “GPS 1: Bad fix”." in browser.text("#verdict")
+    assert browser.ask(f"return {WORD}") == "CANNOT ARM"
+    assert "Cannot arm: “GPS 1: Bad fix”." in browser.text("#verdict")
     quoted = browser.ask("return [...document.querySelectorAll('#verdict bdi')].map((one) => one.innerText)")
     assert "GPS 1: Bad fix" in quoted  # kept apart from our words
     assert "PREARM_FAILING" not in browser.text("#verdict")
@@ -306,12 +307,12 @@ def test_a_group_has_its_members_below_it_and_its_reasons_name_them(browser: Bro
     rows = "return [...document.querySelectorAll('#rows tr')].map((row) => [row.querySelector('a').innerText, "
     assert browser.ask(rows + "row.classList.contains('member')])") == [["robot", False], ["base", True], ["arm", True]]
     assert browser.text("#filters").startswith("2 All")
+    assert browser.text("#fleet-title") == "2 robots"
     browser.ask("location.hash = '#/robot'")
     browser.wait("document.querySelectorAll('#members-rows tr').length === 2")
-    browser.wait(f"{WORD} === 'STOPPED IN PART'")
-    assert "Emergency stop engaged: arm. Another member may move" in browser.text("#verdict")
-    assert "arm: " in browser.text("#causes")
-    assert "E_STOPPED" in browser.text("#causes small")
+    browser.wait(f"{WORD} === 'ARMED'")
+    assert "arm is stopped; base is READY and may move." in browser.text("#verdict")
+    assert browser.ask("return document.querySelector('#verdict').className") == "alarm"
     members = "[...document.querySelectorAll('#members-rows td[data-head=\"E-stop\"]')].map((one) => one.innerText)"
     assert browser.ask(f"return {members}") == ["no", "STOP"]
     assert "base, arm" in browser.text("#who")
@@ -341,29 +342,39 @@ def test_twenty_robots_fit_on_a_screen_and_fifty_on_a_wall(browser: Browser, pag
         assert browser.ask(OUTSIDE) == []
 
 
-def test_with_254_robots_only_rows_of_robots_that_change_are_made_again(browser: Browser, page: Page) -> None:
+def test_with_254_robots_only_the_cells_that_change_are_drawn_again(browser: Browser, page: Page) -> None:
     look_at(browser, page, scenes.fleet(254))
     browser.ask(
         "window.made = {};"
         "new MutationObserver((list) => {"
-        "  const rows = new Set(list.map((one) => one.target).filter((one) => one.tagName === 'TR'));"
-        "  for (const row of rows) {"
-        "    const handle = row.querySelector('a').hash;"
-        "    window.made[handle] = (window.made[handle] ?? 0) + 1;"
+        "  for (const { target } of list) {"
+        "    const cell = (target.closest ? target : target.parentElement).closest('td, th');"
+        "    if (!cell || cell.className === 'link') continue;"  # the age of what was heard
+        "    const handle = cell.closest('tr').querySelector('a').hash;"
+        "    (window.made[handle] ??= {})[cell.dataset.head ?? 'name'] = true;"
         "  }"
-        "}).observe(document.querySelector('#rows'), { childList: true, subtree: true })"
+        "}).observe(document.querySelector('#rows'),"
+        "  { childList: true, subtree: true, characterData: true, attributes: true })"
     )
-    rounds, changing = 4, scenes.fleet(254)[:60]
+    changing = [line for line in scenes.fleet(254) if line["mode"] == "MANUAL" and line["in_motion"] is False][:60]
     places = [f"#/{one['handle']}" for one in changing]
     links = f"[...document.querySelectorAll('#rows a')].filter((one) => {json.dumps(places)}.includes(one.hash))"
-    for n in range(rounds):
-        state = scenes.moving if n % 2 else scenes.parked
-        page.put(*(state(one["handle"], one["system"]) for one in changing))
-        word = "MOVING" if n % 2 else "CANNOT MOVE"
-        browser.wait(f"{links}.every((one) => one.closest('tr').querySelector('.state').textContent === '{word}')")
+    page.put(*(one | {"in_motion": None} for one in changing))
+    browser.wait(f"{links}.every((one) => one.closest('tr').innerText.includes('unk'))")
     made = browser.ask("return window.made")
     assert set(made) == set(places)
-    assert max(made.values()) <= rounds
+    assert {head for cells in made.values() for head in cells} <= {"Moves", "Why"}
+
+
+def test_with_254_robots_a_crash_is_seen_at_once_and_at_the_top(browser: Browser, page: Page) -> None:
+    lines = [scenes.parked(f"robot-{n}", n) for n in range(1, 255)]
+    look_at(browser, page, lines)
+    assert browser.text("#fleet-title") == "254 robots"
+    page.put(scenes.crashed("robot-200", 200))
+    crashed = time.time()
+    seen = browser.wait(f"{ORDER}[0] === 'robot-200'")
+    assert in_time(seen - crashed, 1.0)
+    assert browser.text("#rows .state") == "CRASHED"
 
 
 def test_everything_fits_on_a_phone(browser: Browser, page: Page) -> None:
@@ -371,6 +382,9 @@ def test_everything_fits_on_a_phone(browser: Browser, page: Page) -> None:
     for lines in (scenes.fleet(12), [scenes.in_error("a-robot-with-a-long-name-1")], [scenes.lost("rover")]):
         look_at(browser, page, lines)
         assert browser.ask(OUTSIDE) == []
+        spans = "[...document.querySelectorAll('.why-cell span')]"
+        halves = f"{spans}.map((one) => one.parentElement.clientHeight - one.offsetHeight)"
+        assert min(browser.ask(f"return {halves}"), default=0) >= 0  # no half line
     assert browser.ask("return parseFloat(getComputedStyle(document.querySelector('#verdict strong')).fontSize)") >= 28
     assert browser.ask("return document.querySelector('#verdict').getBoundingClientRect().bottom < innerHeight")
 
@@ -415,6 +429,79 @@ def test_a_new_alarm_is_marked_until_a_person_acknowledges_it(browser: Browser) 
         browser.wait("document.querySelectorAll('#rows tr.alarm').length === 2")
         assert "LOST" in browser.text("#alarm-list")
         assert browser.ask("return document.querySelectorAll('#alarm-list li').length") == 1
+
+
+def test_an_acknowledgement_counts_for_everybody_who_looks(browser: Browser) -> None:
+    with Page(alarm=True) as page, closing(Browser()) as other:
+        page.only([scenes.moving("tug"), scenes.parked("mower", 2)])
+        page.put(scenes.stopped("mower", 2))
+        for one in (browser, other):
+            one.driver.get(page.url)
+            one.wait("document.querySelectorAll('#alarm-list li').length === 1")
+        assert browser.text("#alarm-list button") == "Acknowledge"
+        other.driver.find_element("css selector", "#alarm-list button").click()
+        for one in (browser, other):
+            one.wait("document.querySelector('#alarms').hidden")
+            one.wait("document.querySelectorAll('#log li').length === 2")
+        first, second = browser.text("#log").split("\n")[:2]
+        assert re.fullmatch(r"\d\d:\d\d:\d\d mower EMERGENCY STOP engaged \(acknowledged\)", first)
+        assert re.fullmatch(r"\d\d:\d\d:\d\d mower EMERGENCY STOP engaged", second)
+
+
+def test_the_events_have_begin_and_end_the_newest_first(browser: Browser, page: Page) -> None:
+    page.only([])
+    look_at(browser, page, [scenes.parked("tug"), scenes.parked("mower", 2)])
+    for state in (scenes.stopped, scenes.parked, scenes.lost) * 70:
+        page.put(state("tug"))
+    log = "document.querySelector('[role=log][aria-label=Events]')"
+    browser.wait(f"{log}?.innerText.includes('LOST')")
+    browser.wait(f"{log}.querySelectorAll('li').length >= 200")
+    texts = browser.ask(f"return [...{log}.querySelectorAll('li')].map((one) => one.innerText)")
+    assert re.match(r"\d\d:\d\d:\d\d tug LOST nothing heard", texts[0])
+    assert any(re.match(r"\d\d:\d\d:\d\d tug EMERGENCY STOP released, now PARKED", one) for one in texts)
+
+
+def test_a_band_shows_no_time_for_which_its_field_is_not_kept(browser: Browser, page: Page) -> None:
+    page.only([])
+    for n in range(700):
+        page.put((scenes.parked, scenes.ready)[n % 2]("tug"), ago=70 - n / 10)
+    browser.driver.get(f"{page.url}#/tug")
+    label = "document.querySelector('#bands [role=img][aria-label^=\"Drives powered\"]')"
+    browser.wait(f"{label}?.getAttribute('aria-label').includes('not kept before ')")
+    first = "Math.min(...[...LABEL.querySelectorAll('rect')].map((one) => parseFloat(one.getAttribute('x'))))"
+    oldest = browser.ask(f"return {first.replace('LABEL', label)}")
+    assert oldest >= 100 * (1 - 15 / 600)  # 120 changes at 10 Hz are 12 s
+    quiet = browser.ask(f"return {first.replace('LABEL', label.replace('Drives powered', 'Error'))}")
+    assert quiet <= 100 * (1 - 65 / 600)  # nothing displaced what is known of a quiet field
+
+
+@pytest.mark.parametrize("address", ["wall", "?wall"])
+def test_a_wall_shows_the_robots_in_trouble_in_large_letters_and_nothing_below_its_edge(
+    browser: Browser, page: Page, address: str
+) -> None:
+    browser.size(1920, 1080)
+    page.only(scenes.fleet(254))
+    browser.driver.get("about:blank")
+    browser.driver.get(page.url + address)
+    browser.wait("document.querySelectorAll('#wall-robots li').length > 0")
+    assert browser.text("#wall-counts").startswith("254 robots")
+    size = "return parseFloat(getComputedStyle(document.querySelector(arguments[0])).fontSize)"
+    assert browser.ask(size, "#wall-robots strong") >= 72
+    assert browser.ask(size, "#wall-robots .name") >= 28
+    words = browser.ask("return [...document.querySelectorAll('#wall-robots strong')].map((one) => one.innerText)")
+    assert words[0] == "EMERGENCY STOP"
+    lowest = browser.ask(
+        "return Math.max(...[...document.querySelectorAll('#wall *')].map((one) => one.getBoundingClientRect().bottom))"
+    )
+    assert lowest <= 1080
+    rest = re.fullmatch(r"and (\d+) more", browser.text("#wall-rest"))
+    assert rest is not None
+    assert browser.ask("return document.querySelectorAll('header, button, input').length > 0")
+    assert not browser.ask(
+        "return [...document.querySelectorAll('header, button, footer')].some((one) => one.checkVisibility())"
+    )
+    before = browser.text("#wall-clock")
+    browser.wait(f"document.querySelector('#wall-clock').innerText !== '{before}'")
 
 
 def test_a_page_that_a_person_left_keeps_no_connection(browser: Browser) -> None:

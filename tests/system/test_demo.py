@@ -52,7 +52,7 @@ def heard(listener: socket.socket, enough: Callable[[set[int]], bool]) -> set[in
 def test_a_terminal_shows_the_live_table_and_the_story(demo: Callable[..., Screen]) -> None:
     screen = demo()
     screen.wait_for_text("power on: the autopilot initialises")
-    screen.wait_for_text("▬ CANNOT MOVE     ☺ MANUAL")
+    screen.wait_for_text("⊘ CANNOT ARM     1.1 ")
     screen.wait_for_text("“PreArm: GPS 1: Bad fix”")
     assert screen.text[0].startswith("demo  1 robot")
     assert "Ctrl-C: quit" in screen.text[-1]

@@ -243,7 +243,7 @@ class HostileServer:
         heard = []
         try:
             while True:
-                heard += [unpack(m.payload) for m in decode(self.socket.recv(300)) if hasattr(m, "payload")]
+                heard += [unpack(bytes(m.payload)) for m in decode(self.socket.recv(300)) if hasattr(m, "payload")]
         except OSError:
             pass
         self.requests += [one for one in heard if one is not None]

@@ -127,7 +127,7 @@ def test_a_view_says_what_the_table_says(name: str, request: pytest.FixtureReque
         word = look.short or look.word if name in SHORT else look.word
         assert shown[field] == Shown(word, shown[field].shape and look.shape, shown[field].tone and look.tone)
         whole = headline(line)
-        assert shown["headline"] == Shown(whole.word, whole.shape, whole.tone), (field, value)
+        assert shown["headline"] == Shown(whole.word, whole.state.shape, whole.tone), (field, value)
 
 
 def test_the_page_has_the_colours_of_the_table(browser: Browser, page: Page) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 import pty
@@ -213,8 +214,24 @@ def test_a_browser_draws_a_row_for_each_field_and_reason(
     assert shown.count('aria-roledescription="timeline"') == len(TRACKS) + reasons
     for kind in ("hatched unknown", "full warning", "full alarm", "line calm", "full active", "half calm"):
         assert f'<rect class="{kind}"' in shown, kind
-    for words in ("2001 RC_LOST", "Crash: Going to HOLD", "YES, cycle 1", "○ none → ▲ ERROR", "LINK_STALE ends"):
+    for words in ("2001 RC_LOST", "Crash: Going to HOLD", "YES, cycle 1", "○ none → ◆ ERROR", "LINK_STALE ends"):
         assert words in shown, words
+
+
+def test_the_verdict_is_at_the_top_and_the_legend_below_the_picture(
+    tmp_path: Path, demo_log: Path, opened: Callable[[Path], str]
+) -> None:
+    page = tmp_path / "demo.html"
+    run("report", "-q", str(demo_log), "-o", str(page))
+    (found,) = reported(str(demo_log))
+    shown = opened(page)
+    region = re.search(r'<section class="verdict" aria-label="Verdict">(.*?)</section>', shown, re.DOTALL)
+    assert region is not None
+    assert 'class="shape"' in region[1]
+    assert f"<strong>{found['verdict']['word']}</strong>" in region[1]
+    assert html.escape(found["verdict"]["sentence"]) in region[1].replace("&quot;", '"')
+    assert len(found["verdict"]["sentence"]) <= 200
+    assert shown.index('aria-label="Verdict"') < shown.index('id="main"') < shown.index('id="legend"')
 
 
 def test_the_legend_has_the_words_and_shapes_of_the_one_table(
@@ -244,7 +261,7 @@ def test_the_page_opens_on_the_time_in_which_the_vehicle_was_heard(
     shown = opened(page)
     assert re.search(r"<output>1 min 4\d s of 30 min 00 s</output>", shown)
     assert "When heard" in shown
-    assert re.search(r"Time in each state, of 1 min 4\d s of linked time", shown)
+    assert re.search(r"Time in each state, of 1 min 4\d s with a link", shown)
     assert re.search(r"The link, of 30 min 00 s since the first heartbeat", shown)
 
 

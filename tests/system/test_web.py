@@ -20,6 +20,8 @@ from typing import Any
 
 import pytest
 
+from mav_robot_status.extras import install
+
 from ..deadline import SOON, allow, in_time, wait_until
 from .gateway_process import Gateway, run
 from .wire import Wire
@@ -252,4 +254,4 @@ def test_without_the_extra_the_option_is_a_usage_error() -> None:
         capture_output=True, text=True, timeout=allow(30),
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.splitlines()[-1].endswith("the web page needs an extra: pip install 'mav-robot-status[web]'")
+    assert done.stderr.splitlines()[-1].endswith(f"the web page needs an extra: {install('web')}")

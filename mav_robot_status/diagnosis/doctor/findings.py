@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from ...hardware.mavlink.autopilots.wanted import Wanted
@@ -86,6 +87,8 @@ class VehicleStatus(NamedTuple):
     """Those that speak as it, if there are several or if it is late. The first one is believed."""
     strangers: Strangers | None = None
     """The evidence that two senders use its ids."""
+    next: Mapping[str, str] = MappingProxyType({})
+    """What would make each unknown field known."""
 
     @property
     def lag(self) -> float:

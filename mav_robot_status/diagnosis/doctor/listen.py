@@ -182,4 +182,5 @@ def _status(hw: MavlinkRobotHW, tracked: TrackedVehicle, now: Instant) -> Vehicl
         can_run_applet=can_run(state) and not tracked.costly,
         senders=senders(tracked.belief, now.mono),
         strangers=strangers(tracked.belief, now.mono, hw.options.heartbeat_timeout),
+        next={name: field["next"] for name, field in explained["fields"].items() if field["next"] is not None},
     )

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from ...clock import rfc3339
 from ...hardware.mavlink.identity import named
 from ...json_object import JsonObject
+from ...language import same_step
 from ...mavlink import definitions as mav
 from ...mavlink.counters import OTHER_IDS
 from ...mavlink.enumerations import MAV_AUTOPILOT_PX4
@@ -100,6 +101,8 @@ def _vehicle(s: Speaker) -> Iterator[str]:
     yield from (f"sender {sender.words}" for sender in s.status.senders)
     when = "status when it was last heard: " if s.silent else "status: "
     yield when + ", ".join(f"{name} {_word(value)}" for name, value in shown.fields.items())
+    if not s.silent:
+        yield from (f"unknown {', '.join(names)}: {step}" for step, names in same_step(s.status.next).items())
     yield from applet_heard(s)
     for what, names in (("errors", shown.errors), ("inhibits", shown.inhibits)):
         if names:
@@ -131,6 +134,7 @@ def _speaker(s: Speaker) -> JsonObject:
             **s.status.fields,
             "errors": s.status.errors,
             "inhibits": s.status.inhibits,
+            "next": dict(s.status.next),
         },
         "rates": s.wanted if s.status else {},
         "heard": s.heard and _heard(s.heard),

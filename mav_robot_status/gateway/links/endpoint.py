@@ -61,6 +61,8 @@ class Endpoint:
         self._peers: FairTable[Channel] = FairTable(MOST_PEERS)
         """The peers of a link on which several speak."""
         self._tell_refused = PacedLog(log), PacedLog(log)
+        self._not_heard = 0
+        """How many senders had no channel before the last line about them."""
         self._scratch = Parser(self._wanted)
         """Parses the first bytes of an address. Only a valid frame gives it a channel."""
         self._stranger: Address = None
@@ -238,12 +240,19 @@ class Endpoint:
         """Log how many have no channel, and how many are no peers, because there are too many."""
         tables = (self._table, "not heard"), (self._peers, "neither answered nor forwarded")
         for (table, what), tell in zip(tables, self._tell_refused, strict=True):
+            if now >= tell.due and table is self._table:
+                self._not_heard = len(table.refused)
             if table.refused and now >= tell.due:
                 number = f"{len(table.refused)} sender{'s are' if len(table.refused) > 1 else ' is'} {what}"
                 room = f"there is room for {table.most}, and for {table.most // SHARE} at one address"
                 line = f"{self.link.text}: {number}, {_where(next(iter(table.refused)))} for one: {room}"
                 tell(logging.WARNING, now, line)
                 table.refused.clear()
+
+    @property
+    def left_out(self) -> int:
+        """How many senders have no channel, because there are too many, lately."""
+        return max(len(self._table.refused), self._not_heard)
 
     def totals(self) -> Counters:
         """The counters of all channels, added up."""
@@ -272,7 +281,7 @@ class Endpoint:
         got = self.totals()
         log.info(
             "%s: %d frames, %d lost, %d with a bad CRC, %d with an unknown id, %d bytes of garbage, "
-            "%d datagrams dropped; sent %d bytes unasked, %d messages held back",
+            "%d datagrams dropped; sent %s; %s",
             self.link.text,
             got.frames,
             got.lost,
@@ -280,8 +289,8 @@ class Endpoint:
             sum(got.unknown.values()),
             got.garbage_bytes,
             self.link.dropped,
-            self.budget.sent,
-            self.budget.withheld,
+            _kilobytes(self.budget.sent),
+            f"{self.budget.withheld} messages had to wait" if self.budget.withheld else "no message had to wait",
         )
 
 
@@ -290,6 +299,10 @@ def _renewed(parser: Parser, wanted: frozenset[int] | None) -> Parser:
     new = Parser(wanted)
     new.counters.add(parser.counters)
     return new
+
+
+def _kilobytes(number: int) -> str:
+    return f"{number} bytes" if number < 1000 else f"{number / 1000:.0f} kB"
 
 
 def _where(source: Address) -> str:

@@ -25,12 +25,13 @@ SEARCHED: Final = 16 << 20
 class Recording:
     """One log. Iterate once: each wanted frame with the instant of its arrival; the last frame is None."""
 
-    def __init__(self, path: str, raw: bool = False) -> None:
-        """Open the file. Raises UsageError if it cannot be read.
+    def __init__(self, log: LogReader | str, raw: bool = False) -> None:
+        """Open the file, unless it is open. Raises UsageError if it cannot be read.
 
         `raw`: no time stamps precede the frames; the clock of the autopilot gives the times, see `raw_log`.
         """
-        self._reader = LogReader(path)
+        self._reader = LogReader(log) if isinstance(log, str) else log
+        path = self._reader.path
         self._raw = raw
         if not raw and is_raw(self._reader.head):
             raise UsageError(
@@ -54,7 +55,8 @@ class Recording:
         if not self._is_mavlink():
             with_stamps = "" if self._raw else " with a time stamp"
             raise UsageError(
-                f"{self._reader.path} is not a recorded log: no MAVLink frame{with_stamps} in it; a .tlog is needed"
+                f"{self._reader.path} is not a recorded log: no MAVLink frame{with_stamps} in it, and no onboard log "
+                "either; a .tlog, .bin or .ulg is needed"
             )
 
     def _is_mavlink(self) -> bool:
@@ -84,4 +86,5 @@ class Recording:
             (self.counts.jumps, "clock jumps, each starts a new segment"),
         )
         total = f"{self._reader.path}: {counters.frames} frames"
-        return ", ".join([total, *(f"{number} {what}" for number, what in found if number)])
+        told = [total, *(f"{number} {what}" for number, what in found if number)]
+        return ", ".join(told + ([self._reader.trouble] if self._reader.trouble else []))

@@ -68,6 +68,8 @@ class MavlinkRobotHW(RobotHW):
         """When the status of each vehicle may change. -inf: at once."""
         self.asks = False
         """Whether `due_requests` is called at all."""
+        self.never_asked = ""
+        """Why it is not, in words; empty for a recording, which cannot be asked."""
         self.on_file: Callable[[TrackedVehicle, Any, float], None] | None = None
         """Called with each message of a vehicle that brings a file or its place."""
         self._event_table: EventTable | None = None
@@ -196,6 +198,16 @@ class MavlinkRobotHW(RobotHW):
         for tracked in self._tracked.values():
             if tracked.handle.name == handle:
                 self._update(tracked, now)
+                if isinstance(tracked.handle.evidence, EvidenceOfVehicle):
+                    tracked.handle.evidence.asked = self._asked(tracked, now)
+
+    def _asked(self, tracked: TrackedVehicle, now: Instant) -> dict[str, str]:
+        """What is known about the requests to a vehicle, in words."""
+        return (
+            self._asking.asked(tracked, now.mono)
+            if self.asks
+            else dict.fromkeys(self._asking.names(tracked), self.never_asked)
+        )
 
     def due_requests(
         self,

@@ -16,7 +16,7 @@ from .heartbeat.rule import (
     is_initialising,
     state_words,
 )
-from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason
+from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, off
 
 if TYPE_CHECKING:
     from .autopilots.modes import FlightMode
@@ -53,7 +53,7 @@ def motion_possible(
     """Whether a motion command would move the vehicle now. Errors and sensors do not matter."""
     state = facts.heartbeat.system_status
     if drives is FALSE:
-        return FALSE, why_drives._replace(rule=f"drives_powered is false: {why_drives.rule}")
+        return FALSE, why_drives._replace(rule=off(why_drives.rule))
     if not facts.armed:  # powered or not: a motor test takes no motion command
         return UNKNOWN, why_drives
     if state in NOT_MOVING_STATES:

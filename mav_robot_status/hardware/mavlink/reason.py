@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ...interface.status import Evidence, TriState
+from ...language import next_step
 
 if TYPE_CHECKING:
     from .facts import Facts
@@ -66,17 +67,26 @@ CLAIMED: Final = Reason("another sender claims the ids of this vehicle", claims_
 class EvidenceOfVehicle(Mapping[str, Evidence]):
     """The evidence for each field of a status, made when it is read, with the numbers of that time."""
 
-    __slots__ = ("_facts", "_reasons", "_state")
+    __slots__ = ("_facts", "_reasons", "_state", "asked")
 
     def __init__(self, state: VehicleState, facts: Facts, reasons: Mapping[str, Reason]) -> None:
         self._state, self._facts, self._reasons = state, facts, reasons
+        self.asked: dict[str, str] = {}
+        """What is known about the request for each message, in words."""
 
     def __getitem__(self, field: str) -> Evidence:
         reason = self._reasons[field]
-        return Evidence(reason.rule, *reason.words(self._state, self._facts, reason))
+        source, heard_at = reason.words(self._state, self._facts, reason)
+        step = next_step(field, reason.rule, self._facts.kind.profile.name, self.asked)
+        return Evidence(reason.rule, source, heard_at, step)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._reasons)
 
     def __len__(self) -> int:
         return len(self._reasons)
+
+
+def off(rule: str) -> str:
+    """Why motion is not possible, from the reason why its drives have no power."""
+    return f"Drives are off: {'it is disarmed' if rule == 'disarmed' else rule}"

@@ -137,5 +137,5 @@ assert tuple(FACTS) == Facts._fields
 
 def facts_of(state: VehicleState, deadline: Deadline, options: HardwareOptions, claimed: Claimed = UNDISPUTED) -> Facts:
     """The facts of a vehicle at a time. `deadline.next` is then the first time at which one may change."""
-    facts = Facts._make(fact(state, deadline, options) for fact in FACTS.values())
+    facts = Facts._make([fact(state, deadline, options) for fact in FACTS.values()])
     return facts if claimed is UNDISPUTED else facts._replace(claimed=claimed)

@@ -80,7 +80,8 @@ def strangers(tracked: TrackedVehicle, main: Speaker, rivals: Sequence[Speaker],
     if found is None:
         return
     tracked.tell_strangers_at = now + PACE
-    mine, rename = f"If one of them is yours, name it: {found.mine}", "Give each vehicle a system id of its own."
+    mine = f"If one of them is yours, name it: {found.mine}"
+    rename = "Give each autopilot its own system id (SYSID_THISMAV)."
     log.warning("Two senders speak as vehicle %d.%d: %s. %s", *_ids(tracked), found.who, mine if found.mine else rename)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from ...clock import now as present
 from ...errors import UsageError
+from ...extras import install
 from ...interface import Detail, Publisher, PublisherContext, RobotStatus, RobotStatusMsg
 from .lines import event_of, members_of
 from .naming import Naming
@@ -66,7 +67,7 @@ class MqttPublisher(Publisher):
         except ModuleNotFoundError as error:
             if (error.name or "").startswith("mav_robot_status"):
                 raise
-            raise UsageError("mqtt: this output needs an extra: pip install 'mav-robot-status[mqtt]'") from None
+            raise UsageError(f"mqtt: this output needs an extra: {install('mqtt')}") from None
         self._session = secrets.token_hex(4)
         self._published: dict[str, _Published | None] = {}
         self._names: dict[str, str] = {}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from ...clock import now as present
 from ...errors import UsageError
+from ...extras import install
 from .settings import DDS, Ros2Options, read
 from .worker import Gone, Worker
 
@@ -128,4 +129,4 @@ def extra_of(settings: Ros2Settings) -> Iterator[None]:
         if (error.name or "").startswith("mav_robot_status"):
             raise
         extra = "ros2-dds" if settings.middleware == DDS else "ros2"
-        raise UsageError(f"ros2: this output needs an extra: pip install 'mav-robot-status[{extra}]'") from None
+        raise UsageError(f"ros2: this output needs an extra: {install(extra)}") from None

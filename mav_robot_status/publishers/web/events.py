@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from ...clock import rfc3339
 from ...version import __version__
-from .said import said, with_words
+from .said import about, said, with_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from ...json_object import JsonMapping, JsonObject
     from ..board import Board, Entry
 
-PULSE: Final = 0.2
-"""Seconds between two checks of the board."""
+PULSE: Final = 0.25
+"""Seconds between two checks of the board: a browser draws as often."""
 TICK: Final = 1.0
 """Seconds between two events without a change. They show a browser that the server is alive."""
 PATIENCE: Final = 5.0
@@ -34,7 +34,7 @@ MOST_LISTENERS: Final = 256
 class Listener:
     """One browser: its selected vehicle, and the data that it has."""
 
-    __slots__ = ("abort", "busy_since", "explained", "handle", "sent_until", "sent_version", "turn")
+    __slots__ = ("abort", "busy_since", "explained", "handle", "sent_about", "sent_until", "sent_version", "turn")
 
     def __init__(self, handle: str | None, abort: Callable[[], None]) -> None:
         self.handle = handle
@@ -49,6 +49,8 @@ class Listener:
         self.sent_until: float | None = None
         """The end of the history that it has."""
         self.explained: JsonMapping | None = None
+        self.sent_about = -1
+        """The version of the entry whose causes it has."""
 
 
 class Events:
@@ -67,6 +69,8 @@ class Events:
         self._stale_after, self._alarm = stale_after, alarm
         self._said: dict[str, tuple[int, JsonObject]] = {}
         """What the page says of each handle, with the version of its entry. Made only while a browser needs it."""
+        self.left_out = 0
+        """Senders that the gateway does not hear, because there are too many."""
         self._news = asyncio.Event()
         self._version, self._turn, self._ticked = -1, 0, 0.0
         self._fresh = False
@@ -145,9 +149,15 @@ class Events:
     def _change(self, sent: int, turn: int) -> bytes:
         now = self._clock()
         data: JsonObject = {"now": rfc3339(now.unix_us), "standing": self._standing()}
-        new = [entry for entry in self._board if entry.version > sent]
+        board, alarms = self._board, self._board.alarms
+        new = [entry for entry in board if entry.version > sent]
+        told = [entry for entry in board if self._version_of(entry) > sent]  # what a group says is of its members
         data["vehicles"] = [entry.whole() for entry in new]
-        data["headlines"] = {str(entry.line["handle"]): self._say(entry) for entry in new}
+        data["headlines"] = {str(entry.line["handle"]): self._say(entry) for entry in told}
+        if events := [one._asdict() for one in alarms.events if one.version > sent]:
+            data["events"] = events
+        if alarms.version > sent:
+            data["pending"] = [one._asdict() for one in alarms.pending.values()]
         if turn != self._turn:
             data["beats"] = {
                 handle: [entry.stamp, entry.heartbeat_age, round(now.mono - entry.at, 3)]
@@ -156,27 +166,41 @@ class Events:
         if sent < 0:
             data.update(source=socket.gethostname(), version=__version__)
             data.update(stale_after=self._stale_after, alarm=self._alarm)
+        data["left_out"] = self.left_out + board.refused
         return event("board" if sent < 0 else "change", data)
+
+    def _version_of(self, entry: Entry) -> int:
+        """The version at the last change of a robot, or of a member of a group."""
+        return max((one.version for one in (entry, *self._board.members(entry.line).values())), default=0)
 
     def _say(self, entry: Entry) -> JsonObject:
         handle = str(entry.line["handle"])
         version, words = self._said.get(handle, (-1, {}))
-        if version != entry.version:
-            words = said(entry.whole(), entry.last)
-            self._said[handle] = entry.version, words
+        newest = self._version_of(entry)
+        if version != newest:
+            members = {name: one.line for name, one in self._board.members(entry.line).items()}
+            words = said(entry.whole(), entry.last, members)
+            self._said[handle] = newest, words
             if len(self._said) > len(self._board.entries):  # some are gone
                 self._said = {name: self._said[name] for name in self._board.entries if name in self._said}
         return words
 
     def _about(self, handle: str, entry: Entry, listener: Listener) -> Iterator[bytes]:
-        now = self._clock().mono
+        instant = self._clock()
+        now = instant.mono
+        if listener.sent_about != entry.version:
+            listener.sent_about = entry.version
+            yield event("about", {"handle": handle, **about(entry.whole(), entry.last)})
         since, listener.sent_until = listener.sent_until, now
         new = [t for t in entry.transitions if since is None or t.at > since]
         if since is None or new:
             data = {
                 "handle": handle,
                 "whole": since is None,
-                "known_for": round(now - entry.began, 3),
+                "now": rfc3339(instant.unix_us),
+                "kept_since": {
+                    name: rfc3339(instant.unix_us - round((now - at) * 1e6)) for name, at in entry.kept_since().items()
+                },
                 "transitions": [
                     {
                         "ago": round(now - t.at, 3),

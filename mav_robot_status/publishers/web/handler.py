@@ -54,11 +54,21 @@ def as_json(value: object, status: int = 200) -> Response:
 class Pages(Application):
     """The routes. A path is a regular expression."""
 
-    def __init__(self, answers: Mapping[str, Answer], check: Check, heard: Callable[[HTTPServerRequest], None]) -> None:
-        """`check` may refuse a request; `heard` is called for every request."""
+    def __init__(
+        self,
+        answers: Mapping[str, Answer],
+        check: Check,
+        heard: Callable[[HTTPServerRequest], None],
+        commands: Mapping[str, Answer],
+    ) -> None:
+        """`check` may refuse a request; `heard` is called for every request. `commands` answer the method POST."""
         common = {"check": check, "heard": heard}
+        posted = {"methods": ("POST",), **common}
         super().__init__(
-            [(path, Handler, {**common, "answer": answer}) for path, answer in answers.items()],
+            [
+                *((path, Handler, {**common, "answer": answer}) for path, answer in answers.items()),
+                *((path, Handler, {**posted, "answer": answer}) for path, answer in commands.items()),
+            ],
             default_handler_class=Handler,
             default_handler_args={**common, "answer": _not_found},
             log_function=lambda handler: None,
@@ -75,10 +85,15 @@ class Pages(Application):
 class Handler(RequestHandler):
     """One request, and its response."""
 
-    SUPPORTED_METHODS = ("GET", "HEAD")
-
-    def initialize(self, check: Check, heard: Callable[[HTTPServerRequest], None], answer: Answer) -> None:
+    def initialize(
+        self,
+        check: Check,
+        heard: Callable[[HTTPServerRequest], None],
+        answer: Answer,
+        methods: tuple[str, ...] = ("GET", "HEAD"),
+    ) -> None:
         """Tornado calls this with the headers of the request."""
+        self.SUPPORTED_METHODS = methods
         self._check, self._answer = check, answer
         heard(self.request)
 
@@ -97,11 +112,11 @@ class Handler(RequestHandler):
         if response is not None:
             self._send(response)
 
-    head = get
+    head = post = get
 
     def write_error(self, status_code: int, **_: object) -> None:
         """Send the text of an error. A body is not read after it, so the connection ends."""
-        allow = {"Allow": "GET,HEAD"} if status_code == 405 else {}
+        allow = {"Allow": ",".join(self.SUPPORTED_METHODS)} if status_code == 405 else {}
         body = f"{status_code}: {self._reason}".encode()
         self._send(Response(body, status=status_code, headers={"Connection": "close", **allow}))
 

@@ -6,7 +6,9 @@ from html import escape
 from typing import TYPE_CHECKING, Final
 
 from ...language import LOOKS, TONES
-from ...language.remedies import REMEDIES, SENSOR
+from ...language.remedies import INITIALS, REMEDIES, SENSOR
+from ...language.shapes import drawing
+from ...language.states import ROBOT_STATES
 from ...language.texts import TEXTS
 from .looks import HEADS
 
@@ -15,9 +17,8 @@ if TYPE_CHECKING:
 
 OTHER: Final = ""
 """The topic of a cause that has none."""
-INITIALS: Final = {"gps": "GPS", "rc": "RC", "ekf": "EKF", "imu": "IMU", "esc": "ESC", "hil": "HIL"}
 SAYS: Final = "The autopilot says why: the step for its words is one of these"
-NOTHING: Final = "Nothing, or what the autopilot says."
+NOTHING: Final = "Nobody has to act, or the autopilot says what to do."
 """The step of a cause that has none."""
 PAGE: Final = """<!doctype html>
 <html lang="en">
@@ -70,8 +71,12 @@ def _topic(topic: str) -> Iterator[str]:
 
 
 def _signs() -> Iterator[str]:
-    """The colours, and the words of each field."""
-    yield '<section><h2 id="signs">Colours and words</h2><dl>'
+    """The states, the colours, and the words of each field."""
+    yield '<section><h2 id="states">States, worst first</h2><dl>'
+    for state in ROBOT_STATES:
+        chip = f'<span class="chip {state.tone}">{drawing(state.shape)} {escape(state.word)}</span>'
+        yield f"<dt>{chip}</dt><dd>{escape(_begun(state.meaning))}.</dd>"
+    yield '</dl></section><section><h2 id="signs">Colours and words</h2><dl>'
     for name, tone in TONES.items():
         yield f'<dt class="{name}"><span class="chip {name}">{escape(name)}</span></dt><dd>{escape(tone.meaning)}</dd>'
     for field, looks in LOOKS.items():

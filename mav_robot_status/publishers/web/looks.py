@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 from ...interface import STATES
 from ...language import LINK, LOOKS
-from ...language.headline import LAST, MAY_MOVE, SINCE
+from ...language.headline import LAST, MAY_MOVE
+from ...language.states import ROBOT_STATES
 from ...language.values import UNKNOWN
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from ...language import Look
 
 HEADS: Final = {
-    "mode": ("Mode", "Who commands it"),
+    "mode": ("Mode", "Who drives it"),
     "motion_possible": ("Can move", "Motion possible"),
     "in_motion": ("Moves", "In motion"),
     "drives_powered": ("Drives", "Drives powered"),
@@ -32,12 +33,12 @@ def fields_module() -> bytes:
     fields = sorted(STATES, key=lambda field: order.get(field.name, len(order)))
     rows = [_row(field.name, field.row.meaning) for field in fields]
     said = {
-        "since": SINCE,
         "may_move": MAY_MOVE.text,
         "last": LAST,
         "unknown": _look(UNKNOWN),
     }
-    parts = {"STATES": rows, "LINK": _row(LINK, ""), "SAID": said}
+    robot = [{"word": one.word, "shape": one.shape, "tone": one.tone, "rank": one.rank} for one in ROBOT_STATES]
+    parts = {"ROBOT_STATES": robot, "STATES": rows, "LINK": _row(LINK, ""), "SAID": said}
     return "".join(f"export const {name} = {json.dumps(value)};\n" for name, value in parts.items()).encode()
 
 

@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from ...errors import UsageError
+from ...extras import install
 from ..board import Board
 from .settings import HttpOptions, read
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 MOST_WAITING: Final = 10_000
 """Messages kept for a busy server. Beyond that, only the last of each handle is kept."""
 RETRY: Final = 0.05  # s until the next attempt after the server was busy
+COUNT: Final = 2.0
+"""Seconds between two counts of the senders that are not heard."""
 EXPLAIN: Final = 1.0
 """Seconds between two explanations of a vehicle that a browser shows in detail."""
 
@@ -44,7 +47,7 @@ class HttpPublisher:
         except ModuleNotFoundError as error:
             if (error.name or "").startswith("mav_robot_status"):
                 raise
-            raise UsageError("http: the web page needs an extra: pip install 'mav-robot-status[web]'") from None
+            raise UsageError(f"http: the web page needs an extra: {install('web')}") from None
         self._explain = context.explain
         self._waiting: list[RobotStatusMsg] = []
         self._gone: list[str] = []
@@ -56,6 +59,7 @@ class HttpPublisher:
         """The last status of each of these vehicles."""
         self._metrics = context.metrics
         self._scrapes = Scrapes()
+        self._counted, self._left_out, self._told_left_out = -math.inf, 0, 0
         self.dropped = 0
         """Messages left out because the server was busy."""
         self._server = serve(Board(), options, None if self._metrics is None else self._scrapes)
@@ -88,9 +92,13 @@ class HttpPublisher:
             self._scrapes.wanted = False
             self._server.give(self._metrics(now))
         again = self._explain_one(now)
-        if self._waiting or self._explanations or self._gone:
-            if self._server.post(partial(_put, self._waiting, self._explanations, self._gone)):
+        if self._metrics is not None and self._server.listeners and now.mono >= self._counted + COUNT:
+            self._counted = now.mono
+            self._left_out = sum(one.left_out for one in self._metrics(now).connections)
+        if self._waiting or self._explanations or self._gone or self._left_out != self._told_left_out:
+            if self._server.post(partial(_put, self._waiting, self._explanations, self._gone, self._left_out)):
                 self._waiting, self._explanations, self._gone = [], {}, []
+                self._told_left_out = self._left_out
             elif len(self._waiting) > MOST_WAITING:
                 latest = list({msg.handle: msg for msg in self._waiting}.values())
                 self.dropped += len(self._waiting) - len(latest)
@@ -127,11 +135,13 @@ def _put(
     messages: list[RobotStatusMsg],
     explanations: dict[str, JsonMapping],
     gone: list[str],
+    left_out: int,
     board: Board,
     events: Events,
     now: Instant,
 ) -> None:
     """Runs in the server's thread."""
+    events.left_out = left_out
     for handle in gone:
         board.forget(handle)
     for msg in messages:

@@ -16,6 +16,7 @@ from tornado.iostream import StreamClosedError
 
 from ...clock import now as present
 from ...language import style_sheet
+from ...language.shapes import sprite
 from ...version import __version__
 from .access_control import AccessControl
 from .connections import Connections
@@ -76,6 +77,11 @@ class WebServer:
         """Handles that browsers show in detail. They need explanations."""
         return self._events.watched
 
+    @property
+    def listeners(self) -> int:
+        """How many browsers show the page."""
+        return len(self._events.listeners)
+
     def start(self) -> None:
         """Start the thread."""
         self._thread.start()
@@ -123,7 +129,8 @@ class WebServer:
         self._loop.set_exception_handler(self._failed)
         self._stop = asyncio.Event()
         self._events = Events(self.board, self._clock, self.standing, self._stale_after, self._alarm)
-        pages = Pages(self._answers(), self._access.refusal, lambda request: self._connections.heard(request))
+        commands = {"/api/v1/acknowledge": self._acknowledge}
+        pages = Pages(self._answers(), self._access.refusal, lambda request: self._connections.heard(request), commands)
         self._connections = Connections(self._socket, self.url, pages, lambda: self._clock().mono)
         self._connections.listen()
         self._ready.set()
@@ -144,7 +151,8 @@ class WebServer:
     def _answers(self) -> dict[str, Answer]:
         bodies = {name: (name, body) for name, body in _assets().items()}
         bodies.update((name, (name, made())) for name, made in GENERATED.items())
-        bodies[""] = bodies.pop("index.html")
+        name, index = bodies.pop("index.html")
+        bodies[""] = bodies["wall"] = name, index.replace(b"{{shapes}}", sprite().encode())
         bodies["schema.json"] = SCHEMA, files("mav_robot_status").joinpath(f"data/{SCHEMA}").read_bytes()
         answers = {re.escape(f"/{path}"): _asset(*body) for path, body in bodies.items()}
         answers["/healthz"] = self._healthz
@@ -172,6 +180,13 @@ class WebServer:
         if entry is None:
             return as_json({"error": "no such vehicle; /api/v1/vehicles lists them"}, status=404)
         return as_json(entry.whole())
+
+    async def _acknowledge(self, handler: Handler) -> Response:
+        """A person has seen the alarms. A page of another site cannot send this header."""
+        if "X-Requested-With" not in handler.request.headers:
+            return Response(b"The header X-Requested-With is missing.\n", status=403)
+        self.board.acknowledge(handler.query("handle"), self._clock())
+        return Response(status=204)
 
     async def _stream(self, handler: Handler) -> Response | None:
         listener = Listener(handler.query("handle"), handler.abort)

@@ -615,9 +615,9 @@ function totalsOf(log, vehicle) {
     return [`${name}: ${glyph} ${word}`, share(from[name][value] || 0, whole)];
   };
   const parts = [
-    table(`Time in each state, of ${duration(linked)} of linked time`, ["field", "#yes", "#no", "#unknown"],
+    table(`Time in each state, of ${duration(linked)} with a link`, ["field", "#yes", "#no", "#unknown"],
       FIELDS.filter(isState).map((name) => [name, ...["TRUE", "FALSE", "UNKNOWN"].map((value) => state(name, value))])),
-    table("Time in each mode, of linked time", ["mode", "#time"], [
+    table("Time in each mode, with a link", ["mode", "#time"], [
       ...Object.keys(DATA.looks.mode).map((value) => named("mode", value, linked, inLink)),
       ...Object.keys(inLink.flight_mode).filter(Boolean).map((mode) =>
         [`flight_mode: ${clean(mode)}`, share(inLink.flight_mode[mode], linked)])]),
@@ -707,7 +707,7 @@ const keys = [["wheel on the axis or Ctrl+wheel", "zoom"], ["drag", "move"], ["d
   ["+ − 0", "zoom, whole log"], ["← →", "move, or step through a focused row"]];
 document.getElementById("footer").append(make("p", { class: "help" },
   ...keys.flatMap(([key, does]) => [make("kbd", {}, key), ` ${does}   `])), make("p", {}, `Made by ${DATA.by}. `
-  + "Shares are of linked time, that of the link of the whole time. Unknown is not no: it may move. The status is information, not a safety function."));
+  + "Percentages count only time with a link, that of the link all time. Unknown is not no: it may move. The status is information, not a safety function."));
 
 document.addEventListener("keydown", (event) => {
   if (!active || event.ctrlKey || event.metaKey || event.altKey || event.target.closest("button, summary, a")) return;

@@ -10,14 +10,16 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
+from ...extras import install
 from .log_lines import LogLines
 from .robots import Source
 from .text import Signs
 
 __all__ = ["Source", "is_screen", "show", "terminal_size"]
 
-HINT = "Search, sorting, mouse: pip install 'mav-robot-status[watch]'; Ctrl-C: quit"
-NO_UTF8 = "Search, sorting and the mouse need a terminal with UTF-8; Ctrl-C: quit"
+KEYS = "j k PgDn PgUp: scroll; q: quit"
+HINT = "For search, sorting and the mouse: "
+NO_UTF8 = "Search, sorting and the mouse need a terminal with UTF-8"
 
 
 def is_screen() -> bool:
@@ -46,12 +48,22 @@ def show(source: Source, footer: Callable[[], Sequence[str]] | None = None) -> i
         print_changes(source, signs)
         return 0
     with LogLines().instead_of_stderr() as log:
-        if footer or not utf8 or find_spec("textual") is None:
-            from .plain import redraw
+        if not footer and utf8 and find_spec("textual") is not None:
+            from .screen import run
 
-            hint = HINT if utf8 else NO_UTF8
-            redraw(source, signs, footer or (lambda: (*[text for text, _ in list(log.lines)[-1:]], hint)))
-            return 0
-        from .screen import run
+            return run(source, log, signs)
+        from .plain import redraw
 
-        return run(source, log, signs)
+        command = install("watch")
+        redraw(source, signs, footer or (lambda: _footer(log, utf8, command)))
+    if utf8 and not footer and len(command) > terminal_size().columns:  # in one piece, to be copied
+        sys.stderr.write(f"{HINT}{command}\n")
+    return 0
+
+
+def _footer(log: LogLines, utf8: bool, command: str) -> tuple[str, ...]:
+    """The last line of the log, the keys, and the command for more of them if it fits into one line."""
+    hint = f"{HINT}{command}" if utf8 else NO_UTF8
+    width = terminal_size().columns
+    shown = next((text for text in (hint, command) if len(text) <= width), "")
+    return (*[text for text, _ in list(log.lines)[-1:]], KEYS, *([shown] if shown else []))

@@ -65,11 +65,11 @@ class WatchApp(App[None]):
     #counts .on { text-style: reverse; }
     Table { height: auto; max-height: 50%; scrollbar-size: 1 1; overflow-x: hidden; }
     Table > .datatable--cursor { color: ansi_default; background: ansi_default; text-style: reverse; }
-    .small Table { height: 1fr; max-height: 100%; }
+    .small Table { height: 1fr; max-height: 100%; } #more { height: 1; }
     #pane { height: 1fr; border-top: solid ansi_bright_black; scrollbar-size: 1 1; } #pane Static { height: auto; }
     #log { height: 1; } Input { height: 1; border: none; padding: 0; display: none; }
-    .zoomed Table { display: none; } .small #pane { display: none; } .zoomed #pane { display: block; border: none; }
-    .empty #pane { display: block; }
+    .zoomed Table, .zoomed #more { display: none; } .small #pane { height: 3; border: none; }
+    .zoomed #pane { height: 1fr; border: none; }
     .small #log { display: none; }
     """
     BINDINGS: ClassVar = [
@@ -121,6 +121,7 @@ class WatchApp(App[None]):
             cursor_foreground_priority="renderable",
             cursor_background_priority="renderable",
         )
+        yield Static(id="more", markup=False)
         with VerticalScroll(id="pane", can_focus=False):
             for part in ("robot", "evidence", "changes"):
                 yield Static(id=part, markup=False)
@@ -146,7 +147,10 @@ class WatchApp(App[None]):
             self.exit()
             return
         log = self._log_lines.lines[-1] if self._log_lines.lines else ("", False)
-        seen = (source.version, now.mono // AGES, log, self.size, self._chosen, self._pane)
+        table = next(iter(self.query(Table)), None)
+        if table is None:  # the screen is being closed
+            return
+        seen = (source.version, now.mono // AGES, log, self.size, self._chosen, self._pane, table.scroll_y, table.size)
         if seen == self._drawn:
             return
         self._drawn = seen
@@ -154,9 +158,11 @@ class WatchApp(App[None]):
         wanted = next((one.takes for one in FILTERS if one.word == self._only), lambda _: True)
         found = [robot for robot in self._all if wanted(robot) and matches(robot, self._search)]
         self._shown = in_order(found, sort_key(self._sort), self._reverse)
-        self.screen.set_class(not self._shown, "empty")
         self._draw_counts()
         self._draw_table()
+        more = len(self._shown) - round(table.scroll_y) - (table.size.height - 1)
+        self.query_one("#more", Static).update(f"+{more} more (j, PgDn)")
+        self.query_one("#more").display = more > 0 and not self.screen.has_class("zoomed")
         self._draw_pane()
         text, serious = log
         self.query_one("#log", Static).update(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 from ...interface import STATES
-from ...language import LINK, look
+from ...language import LINK, ROBOT_STATES, look
 from .robots import Order, Robot, by_name, by_urgency
 from .text import Line, Signs, Span, cells, clock, duration, fill, padded, toned
 
@@ -19,43 +19,44 @@ class Column(NamedTuple):
     title: str
     width: int
     """In cells, with the space after it."""
-    least: int
-    """The width of the terminal from which it is shown."""
+    keep: int
+    """When the terminal is narrow, columns with a small number are left out first."""
     cell: Callable[[Robot, Signs], Span]
     order: Order
 
 
 TITLES: Final = {
-    "e_stopped": ("e-stop", 7, 70),
-    "drives_powered": ("power", 7, 70),
-    "motion_possible": ("can", 6, 98),
-    "in_motion": ("motion", 7, 98),
-    "in_error": ("error", 6, 98),
-    "mode": ("mode", 9, 70),
+    "mode": ("mode", 9, 7),
+    "drives_powered": ("power", 7, 6),
+    "e_stopped": ("e-stop", 7, 5),
+    "motion_possible": ("can", 6, 4),
+    "in_motion": ("motion", 7, 4),
+    "in_error": ("error", 6, 4),
 }
-"""Title, width, and the least width of the terminal. A field without a row has its name as title, from WIDEST."""
-WIDEST: Final = 158
-LEAST_WHY: Final = 12
-"""The width below which only the details show the reasons."""
+"""Title, width, and how long it is kept. A field without a row has its name as title, and goes first."""
+ENOUGH: Final = 40
+"""Cells of `why` from which there is room for another column."""
+LEAST_WHY: Final = 21
+"""Cells of `why` from which there is room for the column `heard`: twenty letters and a space."""
+ALWAYS: Final = 9
 INDENT: Final = "  "
 """Before the name of a member, whose row is below that of its group."""
 
 
 def name_of(robot: Robot, signs: Signs) -> Span:
-    """The first cell of a row."""
+    """The name of the robot."""
     return Span((INDENT if robot.group else "") + signs.text(robot.name), "bold")
 
 
 def state(robot: Robot, signs: Signs) -> Span:
-    """The word of the headline, with its symbol."""
+    """The first cell of a row: the word of the headline, with its symbol."""
     top = robot.headline
-    return toned(f"{signs.symbol(top)} {top.word}", top.tone)
+    return toned(f"{signs.symbol(top.state)} {top.word}", top.tone)
 
 
 def why(robot: Robot, signs: Signs) -> Span:
     """The sentences of the headline."""
-    text = " ".join(sentence.plain(clock) for sentence in robot.headline.sentences)
-    return Span(signs.text(text.removeprefix("Cannot move: ")))
+    return Span(signs.text(" ".join(sentence.plain(clock) for sentence in robot.headline.sentences)))
 
 
 def _heard(robot: Robot, signs: Signs) -> Span:
@@ -66,59 +67,73 @@ def _heard(robot: Robot, signs: Signs) -> Span:
 
 def column_of(name: str) -> Column:
     """The column of a field."""
-    title, width, least = TITLES.get(name, (name, max(6, len(name)) + 1, WIDEST))
+    title, width, keep = TITLES.get(name, (name, max(6, len(name)) + 1, 0))
     return Column(
         name,
         title,
         width,
-        least,
+        keep,
         lambda robot, signs: signs.of(look(name, robot.line[name]), width - 1),
         lambda robot: str(robot.line[name]),
     )
 
 
-def _vehicle(name: str, title: str, width: int, least: int) -> Column:
+def _vehicle(name: str, title: str, width: int, keep: int) -> Column:
     return Column(
         name,
         title,
         width,
-        least,
+        keep,
         lambda robot, signs: Span(signs.text(robot.line["vehicle"].get(name) or "")),
         lambda robot: str(robot.line["vehicle"].get(name) or ""),
     )
 
 
-NAME: Final = Column("name", "robot", 6, 0, name_of, by_name)
+STATE: Final = Column("state", "state", 17, ALWAYS, state, by_urgency)
+"""Its width fits the words."""
+NAME: Final = Column("name", "robot", 6, ALWAYS, name_of, by_name)
 """Its width fits the names."""
-WHY: Final = Column("why", "why", 0, 0, why, by_urgency)
+WHY: Final = Column("why", "why", LEAST_WHY, ALWAYS, why, by_urgency)
 """Its width is what the others leave."""
+HEARD: Final = Column(
+    "heard", "heard", 6, 8, _heard, lambda robot: -(robot.row.age if robot.row.age is not None else 1e9)
+)
 COLUMNS: Final = (
+    STATE,
     NAME,
-    Column("state", "state", 18, 0, state, by_urgency),
-    _vehicle("type", "type", 16, 148),
-    _vehicle("flight_mode", "flight mode", 14, 118),
-    *(column_of(field.name) for field in STATES),
-    Column("heard", "heard", 6, 0, _heard, lambda robot: -(robot.row.age if robot.row.age is not None else 1e9)),
+    WHY,
+    HEARD,
+    *sorted((column_of(field.name) for field in STATES), key=lambda column: -column.keep),
     Column(
         "rate",
         "msg/s",
         6,
-        108,
+        3,
         lambda robot, signs: Span(f"{sum(robot.row.rates.values()):.0f}/s"),
         lambda robot: -sum(robot.row.rates.values()),
     ),
-    WHY,
+    _vehicle("flight_mode", "flight mode", 14, 2),
+    _vehicle("type", "type", 16, 1),
 )
 LONGEST_NAME: Final = 16
+LONGEST_WORD: Final = max(len(one.word) for one in ROBOT_STATES)
+NARROW: Final = 60
+"""The width below which the first column is as wide as the words in it."""
 
 
 def columns(width: int, robots: Sequence[Robot]) -> list[Column]:
     """The columns for a terminal of this width and for these robots, with their widths."""
+    words = max(len(robot.headline.word) for robot in robots) if robots and width < NARROW else LONGEST_WORD
     names = max((cells(name_of(robot, Signs()).text) for robot in robots), default=0)
-    shown = [column for column in COLUMNS if column.least <= width and column is not WHY]
-    shown[0] = NAME._replace(width=max(NAME.width, min(LONGEST_NAME, names) + 1))
-    rest = width - sum(column.width for column in shown)
-    return [*shown, WHY._replace(width=rest)] if rest >= LEAST_WHY else shown
+    widths = {"state": max(len("state"), words + 2) + 1, "name": max(NAME.width, min(LONGEST_NAME, names) + 1)}
+    shown = [column._replace(width=widths.get(column.name, column.width)) for column in COLUMNS]
+    for going in sorted(shown, key=lambda column: column.keep):
+        rest = width - sum(column.width for column in shown if column.name != WHY.name)
+        if going.keep == ALWAYS or rest >= (LEAST_WHY if going.name == HEARD.name else ENOUGH):
+            break
+        shown.remove(going)
+    rest = width - sum(column.width for column in shown if column.name != WHY.name)
+    return [column._replace(width=max(0, rest)) if column.name == WHY.name else column for column in shown]
 
 
 def head(shown: Sequence[Column]) -> Line:

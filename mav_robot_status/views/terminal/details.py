@@ -7,7 +7,7 @@ from typing import Final
 
 from ...interface import STATES
 from ...json_object import JsonMapping
-from ...language import LINK, LOOKS, TONES, look
+from ...language import LINK, LOOKS, ROBOT_STATES, TONES, look
 from .columns import state
 from .robots import Change, Robot
 from .text import Line, Signs, Span, clock, duration, fill, padded, toned
@@ -121,6 +121,8 @@ def help_lines(signs: Signs) -> Iterator[Line]:
     """The keys, every value of each field, and what the colours mean."""
     for keys, effect in KEYS:
         yield Span(fill(keys, 12) + " ", "bold"), Span(effect)
+    for one in ROBOT_STATES:
+        yield toned(fill(f"{signs.symbol(one)} {one.word}", 17), one.tone), Span(one.meaning, "dim")
     for field in STATES:
         values: Sequence[Span] = [signs.of(one) for one in LOOKS[field.name].values()]
         spaced = [part for value in values for part in (value, Span("  "))]

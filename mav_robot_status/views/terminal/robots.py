@@ -10,6 +10,7 @@ from ...clock import Instant, rfc3339
 from ...interface import DEFAULT_HANDLE_NAME
 from ...json_object import JsonMapping
 from ...language import Headline, Look, headline, look
+from ...language.states import ARMED
 
 
 class Row(Protocol):
@@ -113,11 +114,7 @@ class Robot(NamedTuple):
     @property
     def has_problem(self) -> bool:
         """Whether it is stopped, in error or not heard, or needs a person."""
-        return self.headline.rank <= MOST_URGENT
-
-
-MOST_URGENT: Final = 4
-"""The last rank of a headline that is a problem."""
+        return self.headline.rank < ARMED.rank
 
 
 class Memory:
@@ -125,7 +122,7 @@ class Memory:
 
     def __init__(self) -> None:
         self._heard: dict[str, JsonMapping] = {}
-        self._headlines: dict[str, tuple[int, Headline]] = {}
+        self._headlines: dict[str, tuple[tuple[int, ...], Headline]] = {}
 
     def robots(self, rows: Iterable[Row], now: Instant) -> list[Robot]:
         """The robots of these rows, in their order."""
@@ -133,18 +130,25 @@ class Memory:
         heard = self._heard | {h: r.line for h, r in by_handle.items() if r.line["link"]["state"] == "CONNECTED"}
         self._heard = {handle: line for handle, line in heard.items() if handle in by_handle}
         groups = {m: handle for handle, row in by_handle.items() for m in row.line.get("members", ())}
-        self._headlines = {h: self._headline(h, row, now) for h, row in by_handle.items()}
+        self._headlines = {
+            h: self._headline(h, row, now, {m: by_handle[m] for m in row.line.get("members", ()) if m in by_handle})
+            for h, row in by_handle.items()
+        }
         return [
             Robot(row, _name(row.line, handle in groups), self._headlines[handle][1], groups.get(handle, ""))
             for handle, row in by_handle.items()
         ]
 
-    def _headline(self, handle: str, row: Row, now: Instant) -> tuple[int, Headline]:
+    def _headline(
+        self, handle: str, row: Row, now: Instant, members: Mapping[str, Row]
+    ) -> tuple[tuple[int, ...], Headline]:
         known = self._headlines.get(handle)
-        if known is not None and known[0] == row.version:
+        versions = row.version, *(member.version for member in members.values())
+        if known is not None and known[0] == versions:
             return known
         whole = {**row.line, "stamp": rfc3339(now.unix_us), "link": {**row.line["link"], "heartbeat_age": row.age}}
-        return row.version, headline(whole, self._heard.get(handle))
+        lines = {name: member.line for name, member in members.items()}
+        return versions, headline(whole, self._heard.get(handle), lines)
 
 
 def _name(line: JsonMapping, is_member: bool) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from datetime import datetime
 from typing import NamedTuple
 
-from ...language import TONES, Headline, Look, Tone
+from ...language import TONES, Look, State, Tone
 from ...streams import visible
 
 
@@ -32,8 +32,8 @@ class Signs(NamedTuple):
         word = look.word if len(look.word) + 2 <= width else look.short or look.word
         return toned(f"{self.symbol(look)} {word}", look.tone)
 
-    def symbol(self, look: Look | Headline) -> str:
-        """The symbol of a value or of a headline."""
+    def symbol(self, look: Look | State) -> str:
+        """The symbol of a value or of a state."""
         return look.glyph if self.utf8 else look.ascii
 
     def text(self, text: object) -> str:
@@ -41,8 +41,11 @@ class Signs(NamedTuple):
         known = clean(text)
         if self.utf8 or known.isascii():
             return known
-        known = known.replace("“", '"').replace("”", '"')
+        known = known.replace("“", '"').replace("”", '"').replace(CUT, ".")
         return "".join(c if c.isascii() else "?" * _cells(c) for c in known)
+
+
+CUT = "…"
 
 
 def toned(text: str, tone: Tone) -> Span:
@@ -69,11 +72,13 @@ def _cells(character: str) -> int:
 
 
 def fill(text: str, width: int) -> str:
-    """The text in exactly `width` cells. A tilde shows a cut."""
+    """The text in exactly `width` cells. Three dots in one cell show a cut; `plain` writes them without UTF-8."""
+    if width < 1:
+        return ""
     if cells(text) > width:
         room, text = width - 1, text + " "
         end = next(i for i, _ in enumerate(text) if cells(text[: i + 1]) > room)
-        text = text[:end] + "~"
+        text = text[:end] + CUT
     return text + " " * (width - cells(text))
 
 

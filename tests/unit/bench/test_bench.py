@@ -17,7 +17,7 @@ from bench.case import Bench, Case
 from bench.contenders import ROUTER, Contenders, version_of
 from bench.feed import Feed
 from bench.process import BenchError, Child, drained, free_port, queue
-from bench.report import BEGIN, END, into, render
+from bench.report import BEGIN, END, into, summary
 from bench.results import FIRST_MACHINE, OURS, Sample, Skip, Target
 from bench.sender import Sender
 
@@ -61,7 +61,7 @@ def test_a_run_writes_the_tables_into_a_page(tmp_path: pathlib.Path, monkeypatch
     text = page.read_text()
     assert text.startswith("before\n")
     assert "The machine is busy: tests." in text
-    assert text == into(text, render(json.loads((tmp_path / "results.json").read_text())))
+    assert text == into(text, summary(json.loads((tmp_path / "results.json").read_text())))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from bench.report import BEGIN, END, RESULTS, into, render, write
+from bench.report import BEGIN, END, RESULTS, committed, into, render, write
 from bench.results import FIRST_MACHINE, OURS, PYMAVLINK, Sample, Skip, Target, collect
 
 from ...docs.documents import ROOT
@@ -94,15 +94,21 @@ def test_the_result_of_an_earlier_run_is_a_column_of_the_targets() -> None:
 
 
 @pytest.mark.parametrize(("date", "compared"), [("yesterday", True), ("today", False)])
-def test_a_page_compares_with_an_earlier_run_but_not_with_the_same(
+def test_the_committed_tables_compare_with_an_earlier_run_but_not_with_the_same(
     tmp_path: pathlib.Path, date: str, compared: bool
 ) -> None:
+    (tmp_path / "results.json").write_text(json.dumps(whole(result(RATIO))))
+    (tmp_path / "before.json").write_text(json.dumps({**whole(result(RATIO)), "date": date}))
+    assert ("Before: " in committed(tmp_path)) is compared
+
+
+def test_a_page_gets_the_targets_and_no_other_table(tmp_path: pathlib.Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"{BEGIN}{END}")
     (tmp_path / "results.json").write_text(json.dumps(whole(result(RATIO))))
-    (tmp_path / "before.json").write_text(json.dumps({**whole(result(RATIO)), "date": date}))
     write(page, tmp_path)
-    assert ("Before: " in page.read_text()) is compared
+    assert "| parsing: at most 1/9 | 1/9 pymavlink | yes |" in page.read_text()
+    assert "### Parsing" not in page.read_text()
 
 
 def whole(case: dict[str, Any]) -> dict[str, Any]:

@@ -95,6 +95,7 @@ def test_a_moment_between_two_messages_uses_the_earlier_message(tmp_path: Path, 
         "rule": "disarmed",
         "source": "HEARTBEAT.base_mode 65",
         "age": age,
+        "next": None,
     }
 
 
@@ -179,6 +180,19 @@ def test_an_explanation_has_the_values_of_the_line_at_that_moment(name: str) -> 
 # -- as a table --------------------------------------------------------------------------------------------------------
 
 
+UNKNOWN_THERE = ("e_stopped", "in_motion", "in_error")
+"""What a vehicle that sends only HEARTBEATs leaves UNKNOWN."""
+
+
+def test_each_unknown_field_says_what_would_make_it_known(tmp_path: Path) -> None:
+    (found,) = explain_log(Config(), log_of(tmp_path / "a.tlog", 0, 1), "+0.5")
+    steps = {name: field["next"] for name, field in found["fields"].items() if field["next"] is not None}
+    assert tuple(steps) == UNKNOWN_THERE
+    assert "mav-robot-status applet" in steps["e_stopped"]
+    assert "GLOBAL_POSITION_INT" in steps["in_motion"]
+    assert "SYS_STATUS" in steps["in_error"]
+
+
 def test_the_table_has_one_aligned_row_for_each_field(tmp_path: Path) -> None:
     found = explain_log(Config(), log_of(tmp_path / "a.tlog", 0, 1), "+0.5")
     title, heading, *rows = as_table(found)
@@ -191,8 +205,9 @@ def test_the_table_has_one_aligned_row_for_each_field(tmp_path: Path) -> None:
     assert rows[2][heading.index("why") :] == "disarmed  [HEARTBEAT.base_mode 65]"
     assert rows[2][: heading.index("why")].endswith("  0.5 s  ")
     assert rows[4][: heading.index("why")].split() == ["in_motion", "UNKNOWN"]  # no message was read, so it has no age
-    assert rows[6] == "applet   not heard: docs/ardupilot-applet.md"
-    causes = [row.split()[:2] for row in rows[7:] if not row.startswith("step")]
+    assert [row.partition(":")[0] for row in rows[6:9]] == [f"unknown  {name}" for name in UNKNOWN_THERE]
+    assert rows[9] == "applet   not heard: docs/ardupilot-applet.md"
+    causes = [row.split()[:2] for row in rows[10:] if not row.startswith("step")]
     assert causes == [["inhibit", i["name"]] for i in found[0]["inhibits"]]
 
 
@@ -202,7 +217,7 @@ def test_a_cause_is_followed_by_its_step_which_is_named_once(tmp_path: Path) -> 
     failing = [{"name": "PREARM_FAILING", "text": f"PreArm: GPS {n}: Bad fix", "since": since} for n in (1, 2)]
     low = {"code": 2003, "name": "BATTERY_LOW", "text": None, "since": since}
     rows = as_table([found | {"errors": [low], "inhibits": failing}])
-    assert rows[9:] == [
+    assert rows[12:] == [
         f"error    2003 BATTERY_LOW since {since}",
         "step     Bring it back or land it. Charge or change the battery.",
         f'inhibit  PREARM_FAILING since {since}: "PreArm: GPS 1: Bad fix"',

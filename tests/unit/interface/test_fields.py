@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import pathlib
 import re
-import string
 import xml.etree.ElementTree as ET
 from importlib.resources import files
 
@@ -113,11 +112,6 @@ def test_each_field_has_two_separate_bits_in_rs_state() -> None:
     bits = [bits for _, bits in named_value.PACKED]
     assert sorted(bits) == list(range(0, 2 * len(bits), 2))
     assert bits[-1] < 30  # NAMED_VALUE_INT is an int32
-
-
-def test_the_text_for_ground_stations_names_fields() -> None:
-    named = {name for _, name, _, _ in string.Formatter().parse(named_value.TEXT) if name}
-    assert named <= set(NAMES)
 
 
 def test_the_table_of_the_terminal_has_a_column_for_every_state() -> None:

@@ -39,12 +39,12 @@ def test_no_two_values_of_a_field_look_the_same(part: str) -> None:
         assert len(set(found)) == len(found), (name, found)
 
 
-def test_a_glyph_is_one_cell_and_a_short_word_four_letters_at_most() -> None:
+def test_a_glyph_is_one_cell_and_a_short_word_five_letters_at_most() -> None:
     for one in (one for looks in LOOKS.values() for one in looks.values()):
         assert len(one.glyph) == len(one.ascii) == 1
         assert one.ascii.isascii()
         assert len(one.short or one.word) <= 8
-        assert not one.short or len(one.short) <= 4
+        assert not one.short or len(one.short) <= 5
 
 
 def test_every_tone_is_in_the_table_and_has_a_contrast_of_4_5() -> None:

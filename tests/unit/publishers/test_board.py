@@ -173,10 +173,32 @@ def test_transitions_are_bounded_in_age_and_number() -> None:
     board = Board()
     for at in range(2000):
         board.update(msg(AUTO if at % 2 else MANUAL), at / 100)
-    transitions = board.entries["robot"].transitions
-    assert len(transitions) == boards.MOST_TRANSITIONS
+    entry = board.entries["robot"]
+    assert [t.name for t in entry.transitions].count("mode") == boards.MOST_TRANSITIONS
     board.update(msg(AUTO._replace(in_error=TriState.FALSE)), 19.99 + boards.KEPT + 1)
-    assert [t.name for t in transitions] == ["in_error"]
+    assert [t.name for t in entry.transitions] == ["in_error"]
+
+
+def test_a_field_is_known_since_its_oldest_kept_change_and_a_busy_one_displaces_no_other() -> None:
+    board, count = Board(), 700
+    for at in range(count):
+        board.update(msg(AUTO if at % 2 else MANUAL), at / 10)
+    entry = board.entries["robot"]
+    since = entry.kept_since()
+    assert since["mode"] == next(t.at for t in entry.transitions if t.name == "mode") > 0.0
+    assert since["in_error"] == since["link"] == entry.began == 0.0
+    assert [t.name for t in entry.transitions].count("in_error") == 1
+
+
+def test_the_events_of_the_robots_are_on_the_board_and_an_acknowledgement_is_a_change() -> None:
+    board, now = Board(), Instant(5.0, 5_000_000)
+    board.update(msg(AUTO._replace(e_stopped=TriState.TRUE)), 0.0)
+    assert [(one.word, one.what) for one in board.alarms.events] == [("EMERGENCY STOP", "begins")]
+    version = board.version
+    board.acknowledge("robot", now)
+    assert (board.version, len(board.alarms.pending)) == (version + 1, 0)
+    board.acknowledge("robot", now)
+    assert board.version == version + 1
 
 
 def test_the_number_of_handles_is_bounded() -> None:

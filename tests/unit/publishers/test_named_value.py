@@ -5,11 +5,21 @@ from itertools import pairwise
 
 import pytest
 
-from mav_robot_status.interface import Audience, Detail, LinkState, PublisherContext, RobotMode, RobotStatus, TriState
+from mav_robot_status.interface import (
+    Audience,
+    Detail,
+    ErrorCause,
+    Inhibit,
+    LinkState,
+    PublisherContext,
+    RobotMode,
+    RobotStatus,
+    TriState,
+)
 from mav_robot_status.mavlink.decode import text
 from mav_robot_status.mavlink.definitions import NamedValueInt, Statustext
 from mav_robot_status.mavlink.encode import encode
-from mav_robot_status.publishers.named_value import NamedValuePublisher, packed, text_of
+from mav_robot_status.publishers.named_value import LONGEST_TEXT, NamedValuePublisher, cut, packed
 
 from .port import Port, Sent, msg, publish, run
 
@@ -25,6 +35,13 @@ DRIVING = RobotStatus(
 STANDING = DRIVING._replace(in_motion=TriState.FALSE)
 PARKED = STANDING._replace(mode=RobotMode.MANUAL, motion_possible=TriState.FALSE)
 FAILING = DRIVING._replace(in_error=TriState.TRUE, error_code=4001)
+FREE = DRIVING._replace(e_stopped=TriState.FALSE)
+STOPPED = PARKED._replace(mode=RobotMode.AUTO, drives_powered=TriState.FALSE, e_stopped=TriState.TRUE)
+LOW = Detail(1, 1, (ErrorCause(2003, "BATTERY_LOW", "Battery 1 is low 10.21V used 4910 mAh", 0),))
+CRASH = Detail(1, 1, (ErrorCause(4001, "CRASH", "Crash: Going to HOLD", 0),))
+LOST = Detail(1, 1, link=LinkState.LOST)
+AUTO_TEXT, MANUAL_TEXT = (6, "Mode AUTO: a program drives"), (6, "Mode MANUAL: a pilot drives")
+CRASHED_TEXT = (2, "CRASHED: Going to HOLD")
 
 
 @pytest.fixture
@@ -87,27 +104,89 @@ def test_rs_state_has_two_bits_for_each_field(status: RobotStatus, word: int) ->
     assert packed(status) == word
 
 
+def said(mirror: NamedValuePublisher, port: Port, *steps: tuple[float, RobotStatus, Detail]) -> list[tuple[int, str]]:
+    """The texts about a vehicle whose mode AUTO is known."""
+    publish(mirror, -10.0, msg(FREE))
+    port.taken()
+    for at, status, detail in steps:
+        again = publish(mirror, at, msg(status, detail))
+    while again is not None:  # what is delayed
+        again = publish(mirror, again)
+    return texts(port.taken())
+
+
 @pytest.mark.parametrize(
-    ("status", "line"),
+    ("steps", "wanted"),
     [
-        (DRIVING, "RS: AUTO drv=1 mot=1 poss=1 es=? err=0"),
-        (PARKED._replace(e_stopped=TriState.TRUE), "RS: MANUAL drv=1 mot=0 poss=0 es=1 err=0"),
-        (FAILING, "RS: AUTO drv=1 mot=1 poss=1 es=? err=4001"),
-        (RobotStatus(), "RS: UNKNOWN drv=? mot=? poss=? es=? err=?"),
+        (((0.0, STOPPED, Detail(1, 1)),), [(2, "EMERGENCY STOP engaged")]),
+        (
+            ((0.0, STOPPED, Detail(1, 1)), (5.0, FREE, Detail(1, 1))),
+            [(2, "EMERGENCY STOP engaged"), (6, "Emergency stop released")],
+        ),
+        (((0.0, FAILING, CRASH),), [CRASHED_TEXT]),
+        (((0.0, FAILING, LOW),), [(3, "FAULT: battery low")]),
+        (
+            ((0.0, FAILING, LOW), (5.0, FREE, Detail(1, 1))),
+            [(3, "FAULT: battery low"), (6, "Fault ended: battery low")],
+        ),
+        (((0.0, FREE._replace(mode=RobotMode.MANUAL), Detail(1, 1)),), [MANUAL_TEXT]),
+        (
+            ((0.0, FAILING, Detail(3, 1, (ErrorCause(9002, "SYSTEM_ID_CONFLICT", None, 0),))),),
+            [(3, "CONFLICT: two autopilots use system id 3")],
+        ),
     ],
 )
-def test_a_text_has_all_fields_in_one_line(status: RobotStatus, line: str) -> None:
-    assert text_of(status) == line
+def test_an_event_is_one_text_in_words_with_its_severity(
+    mirror: NamedValuePublisher,
+    port: Port,
+    steps: tuple[tuple[float, RobotStatus, Detail], ...],
+    wanted: list[tuple[int, str]],
+) -> None:
+    assert said(mirror, port, *steps) == wanted
 
 
-def test_the_longest_text_fits_one_statustext() -> None:
-    assert len(text_of(RobotStatus(in_error=TriState.TRUE, error_code=-(2**31)))) == 50
+def test_a_robot_that_cannot_arm_says_why(mirror: NamedValuePublisher, port: Port) -> None:
+    refused = Detail(
+        1, 1, inhibits=(Inhibit("PREARM_FAILING", "PreArm: GPS 1: Bad fix", 0), Inhibit("DISARMED", None, 0))
+    )
+    parked = PARKED._replace(mode=RobotMode.AUTO, drives_powered=TriState.FALSE, e_stopped=TriState.FALSE)
+    assert said(mirror, port, (0.0, parked, refused)) == [(4, "CANNOT ARM: GPS 1: Bad fix")]
+
+
+def test_a_lost_vehicle_says_for_how_long_nothing_is_heard_and_a_loss_ends_no_error(
+    mirror: NamedValuePublisher, port: Port
+) -> None:
+    publish(mirror, 0.0, msg(FAILING, LOW))
+    publish(mirror, 10.0)
+    port.taken()
+    publish(mirror, 20.0, msg(RobotStatus(), LOST)._replace(heartbeat_age=3.6))
+    publish(mirror, 30.0, msg(FAILING, LOW))
+    assert texts(port.taken()) == [(4, "LOST: nothing heard for 4 s"), (6, "Heard again: MOVING")]
+
+
+def test_what_is_not_known_is_told_each_time_and_its_end_is_not(mirror: NamedValuePublisher, port: Port) -> None:
+    unsure = FREE._replace(drives_powered=TriState.UNKNOWN, motion_possible=TriState.UNKNOWN, in_motion=TriState.FALSE)
+    still = FREE._replace(in_motion=TriState.FALSE)
+    steps = [(at * 5.0, status, Detail(1, 1)) for at, status in enumerate((unsure, still, unsure))]
+    assert said(mirror, port, *steps) == [(5, "UNKNOWN: whether it can move is not known")] * 2
+
+
+def test_a_stop_of_which_nothing_is_known_is_not_called_released(mirror: NamedValuePublisher, port: Port) -> None:
+    found = said(mirror, port, (0.0, STOPPED, Detail(1, 1)), (5.0, DRIVING, Detail(1, 1)))
+    assert found[-1] == (6, "Emergency stop: unknown whether it is released")
+
+
+@pytest.mark.parametrize("words", ["x" * 200, "\u2714" * 40, "Crash: " + "ä" * 60])
+def test_a_text_has_at_most_50_bytes_of_whole_characters(words: str) -> None:
+    found = cut(f"CRASHED: {words}")
+    assert len(found) <= LONGEST_TEXT
+    assert found.decode().startswith("CRASHED: ")
 
 
 def test_messages_go_to_ground_stations_and_not_to_the_vehicle(mirror: NamedValuePublisher, port: Port) -> None:
     publish(mirror, 0.0, msg(DRIVING, Detail(7, 1)))
     assert values(port.sent) == [("RS_STATE", packed(DRIVING)), ("RS_ERROR", 0)]
-    assert texts(port.sent) == [(6, text_of(DRIVING))]
+    assert texts(port.sent) == [AUTO_TEXT]
     assert {(s.key, s.system) for s in port.sent} == {("out", 7)}
 
 
@@ -149,63 +228,30 @@ def test_a_change_of_motion_or_power_sends_values_and_no_text(mirror: NamedValue
     assert texts(port.sent) == []
 
 
-@pytest.mark.parametrize(
-    "changed",
-    [
-        DRIVING._replace(mode=RobotMode.MANUAL),
-        DRIVING._replace(e_stopped=TriState.FALSE),
-        DRIVING._replace(motion_possible=TriState.UNKNOWN),
-        DRIVING._replace(in_error=TriState.UNKNOWN),
-    ],
-)
-def test_a_change_of_an_announced_field_sends_a_text(
-    mirror: NamedValuePublisher, port: Port, changed: RobotStatus
-) -> None:
-    publish(mirror, 0.0, msg(DRIVING))
-    port.taken()
-    publish(mirror, 2.0, msg(changed))
-    assert texts(port.sent) == [(6, text_of(changed))]
-
-
-def test_a_text_is_a_warning_only_when_an_error_begins(mirror: NamedValuePublisher, port: Port) -> None:
-    stopped = FAILING._replace(motion_possible=TriState.FALSE)
-    for at, status in enumerate((DRIVING, FAILING, stopped, DRIVING, FAILING)):
-        publish(mirror, at * 2.0, msg(status))
-    assert [severity for severity, _ in texts(port.sent)] == [6, 4, 6, 6, 4]
-
-
-def test_an_error_in_the_first_status_is_a_warning(mirror: NamedValuePublisher, port: Port) -> None:
-    publish(mirror, 0.0, msg(FAILING))
-    assert texts(port.sent) == [(4, text_of(FAILING))]
-
-
-def test_at_most_one_text_is_sent_in_2_s_and_the_last_state_is_always_sent(
-    mirror: NamedValuePublisher, port: Port
-) -> None:
-    at: list[float] = []
+def test_at_most_one_text_is_sent_in_2_s_but_a_worse_one_at_once(mirror: NamedValuePublisher, port: Port) -> None:
+    found: list[tuple[float, int]] = []
+    manual = FREE._replace(mode=RobotMode.MANUAL)
     for tick in range(100):
-        publish(mirror, tick * 0.1, msg((DRIVING, PARKED)[tick % 2]))
-        at += [tick * 0.1] * len(texts(port.taken()))
-    assert len(at) > 3
-    assert all(later - earlier >= 2.0 for earlier, later in pairwise(at))
-    again = publish(mirror, 10.0, msg(FAILING))
-    assert again is not None
-    while again is not None:
-        port.taken()
-        again = publish(mirror, again)
-    assert texts(port.sent) == [(4, text_of(FAILING))]
+        at = tick * 0.1
+        publish(mirror, at, msg((FREE, manual)[tick % 2]) if tick < 55 else msg(FAILING, CRASH))
+        found += [(at, severity) for severity, _ in texts(port.taken())]
+    calm = [at for at, severity in found if severity == 6]
+    assert len(calm) >= 3
+    assert all(later - earlier >= 2.0 for earlier, later in pairwise(calm))
+    assert [at for at, severity in found if severity == 2] == [5.5]
 
 
 def test_a_state_that_ends_while_it_is_delayed_is_not_sent(mirror: NamedValuePublisher, port: Port) -> None:
-    for at, status in ((0.0, DRIVING), (0.5, FAILING), (1.0, DRIVING)):
+    manual = FREE._replace(mode=RobotMode.MANUAL)
+    for at, status in ((0.0, FREE), (0.5, manual), (1.0, FREE)):
         publish(mirror, at, msg(status))
-    publish(mirror, 2.5, msg(DRIVING))
-    assert texts(port.sent) == [(6, text_of(DRIVING))]
+    publish(mirror, 2.5, msg(FREE))
+    assert texts(port.sent) == [AUTO_TEXT]
 
 
 def test_messages_about_a_vehicle_have_its_system_id(mirror: NamedValuePublisher, port: Port) -> None:
     publish(mirror, 0.0, msg(DRIVING), msg(FAILING, Detail(9, 1), handle="other"))
-    assert texts([s for s in port.sent if s.system == 1]) == [(6, text_of(DRIVING))]
+    assert texts([s for s in port.sent if s.system == 1]) == [AUTO_TEXT]
     assert values([s for s in port.sent if s.system == 9])[1] == ("RS_ERROR", 4001)
 
 
@@ -220,8 +266,8 @@ def test_a_new_ground_station_gets_the_last_status_at_once(mirror: NamedValuePub
 def test_a_lost_vehicle_is_sent_and_one_without_a_heartbeat_is_not(mirror: NamedValuePublisher, port: Port) -> None:
     publish(mirror, 0.0, msg(detail=Detail(1, None, link=LinkState.NEVER_SEEN)))
     assert port.sent == []
-    publish(mirror, 0.1, msg(detail=Detail(1, 1, link=LinkState.LOST)))
-    assert texts(port.sent) == [(6, "RS: UNKNOWN drv=? mot=? poss=? es=? err=?")]
+    publish(mirror, 0.1, msg(detail=LOST))
+    assert [text[:5] for _, text in texts(port.sent)] == ["LOST:"]
 
 
 def test_requests_for_robot_status_do_not_affect_named_values(mirror: NamedValuePublisher, port: Port) -> None:

@@ -15,6 +15,7 @@ from mav_robot_status.interface import Controller, Publisher, PublisherContext, 
 from mav_robot_status.publishers.board import BoardPublisher
 from mav_robot_status.publishers.json_lines import JsonLinesPublisher
 from mav_robot_status.publishers.mavlink import MavlinkPublisher
+from mav_robot_status.publishers.mcap.publisher import McapPublisher
 from mav_robot_status.publishers.mqtt.publisher import MqttPublisher
 from mav_robot_status.publishers.named_value import NamedValuePublisher
 from mav_robot_status.publishers.ros.publisher import Ros2Publisher
@@ -76,6 +77,21 @@ class TestMqtt(PublisherConformance):
     @pytest.fixture(autouse=True)
     def _spool(self, tmp_path: Path) -> None:
         self.options = {"url": "mqtt://127.0.0.1:1/robots", "spool": str(tmp_path / "spool"), "robot": "r-{handle}"}
+
+
+class TestMcap(PublisherConformance):
+    @pytest.fixture(autouse=True)
+    def place(self, tmp_path: Path) -> None:
+        self.options = {"path": str(tmp_path / "status.mcap")}
+
+    def make_publisher(self, context: PublisherContext) -> Publisher:
+        return McapPublisher(context)
+
+
+class TestMcapOfRos2(TestMcap):
+    @pytest.fixture(autouse=True)
+    def place(self, tmp_path: Path) -> None:
+        self.options = {"path": str(tmp_path / "status.mcap"), "format": "ros2"}
 
 
 class TestSimpleMessage(PublisherConformance):

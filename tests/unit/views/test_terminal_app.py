@@ -50,7 +50,7 @@ def use(source: Source, user: User, size: tuple[int, int] = (100, 30)) -> WatchA
 def shown(pilot: Pilot[None]) -> list[str]:
     """The names in the table, from its top."""
     table = pilot.app.query_one(Table)
-    return [str(table.get_row_at(i)[0]).strip() for i in range(table.row_count)]
+    return [str(table.get_row_at(i)[1]).strip() for i in range(table.row_count)]
 
 
 def selected(pilot: Pilot[None]) -> str:
@@ -89,7 +89,7 @@ def test_it_starts_at_the_top_on_the_worst_robot_and_stays_there_until_a_user_mo
         await press(pilot)
         assert shown(pilot)[0] == "2.1"  # the user's robot moved up, and is still the one
         assert selected(pilot) == "2.1"
-        assert text_of(pilot, "robot").startswith("● CAN MOVE  2.1")
+        assert text_of(pilot, "robot").startswith("▲ CRASHED  2.1")
 
     use(source, user)
 
@@ -123,7 +123,7 @@ def test_a_search_shows_what_matches_and_escape_shows_all() -> None:
 def test_the_counts_are_filters_for_keys_and_mouse() -> None:
     async def user(pilot: Pilot[None]) -> None:
         texts = [str(count.render()).strip() for count in pilot.app.query(Count)]
-        assert texts == ["▲ 1 in error", "■ 1 e-stopped", "✗ 1 not heard", "● 2 can move"]
+        assert texts == ["◆ 1 in error", "■ 1 e-stopped", "✗ 1 not heard", "● 2 can move"]
         for key, names in (("1", ["4.1"]), ("2", ["3.1"]), ("3", ["5.1"]), ("4", ["4.1", "1.1"])):
             await press(pilot, key)
             assert shown(pilot) == names
@@ -140,13 +140,13 @@ def test_the_counts_are_filters_for_keys_and_mouse() -> None:
 
 def test_a_column_is_sorted_by_key_and_by_a_click_on_its_title() -> None:
     async def user(pilot: Pilot[None]) -> None:
-        await pilot.click(Table, offset=(1, 0))
+        await pilot.click(Table, offset=(19, 0))
         await press(pilot)
         assert shown(pilot) == ["1.1", "2.1", "3.1", "4.1", "5.1"]
         await press(pilot, "r")
         assert shown(pilot)[0] == "5.1"
         await press(pilot, "s")
-        assert shown(pilot)[0] == "3.1"  # by state: the worst first
+        assert shown(pilot)[0] == "3.1"  # by the cause: the worst first
 
     use(Source(fleet()), user)
 
@@ -184,16 +184,18 @@ def test_the_details_have_evidence_rates_and_changes() -> None:
 def test_a_tiny_terminal_shows_the_table_and_on_enter_the_details() -> None:
     async def user(pilot: Pilot[None]) -> None:
         pane, table = pilot.app.query_one("#pane"), pilot.app.query_one(Table)
-        assert (table.size.height, pane.size.height) == (8, 0)
+        assert (table.size.height, pane.size.height) == (4, 3)
         assert shown(pilot)[0] == "3.1"
+        assert text_of(pilot, "more") == "+2 more (j, PgDn)"
+        assert text_of(pilot, "robot").startswith("■ EMERGENCY STOP  3.1")
         await press(pilot, "enter")
         assert (table.size.height, pane.size.height) == (0, 8)
         await press(pilot, "escape")
-        assert table.size.height == 8
+        assert table.size.height == 4
         await press(pilot, "e")
         assert pane.size.height == 8
         await press(pilot, "escape")
-        assert (table.size.height, selected(pilot)) == (8, "3.1")
+        assert (table.size.height, selected(pilot)) == (4, "3.1")
 
     use(Source(fleet()), user, (40, 10))
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mav_robot_status.interface import STATES, Field, Kind, LinkState, RobotMode, TriState
-from mav_robot_status.language import LINK, LOOKS, TONES, headline
+from mav_robot_status.language import LOOKS, TONES, headline
 from mav_robot_status.publishers.board import Board
 from mav_robot_status.views.terminal.columns import column_of, state
 from mav_robot_status.views.terminal.text import Signs
@@ -41,5 +41,5 @@ def test_the_state_of_a_robot_is_its_headline(link: LinkState) -> None:
     put(board, PARKED, link=link)
     (robot,) = robots(board)
     top = headline(robot.line)
-    assert state(robot, Signs()) == (f"{top.glyph} {top.word}", TONES[top.tone].terminal)
-    assert (top.word == LOOKS[LINK]["LOST"].word) is (link is LinkState.LOST)
+    assert state(robot, Signs()) == (f"{top.state.glyph} {top.word}", TONES[top.tone].terminal)
+    assert (top.word == "LOST") is (link is LinkState.LOST)

@@ -16,13 +16,22 @@ from mav_robot_status.views.terminal.log_lines import KEPT, LogLines
 from mav_robot_status.views.terminal.plain import frame, print_changes, screen
 from mav_robot_status.views.terminal.text import Signs, Span
 
-from .fleet import DISARMED, DRIVING, FAILED, PARKED, RADIO, START, Source, put, robots, texts
+from .fleet import CRASH, DISARMED, DRIVING, FAILED, PARKED, RADIO, START, Source, put, robots, texts
 
 
-def drawn(board: Board, columns: int, lines: int, colours: bool = False, signs: Signs | None = None) -> str:
+def drawn(
+    board: Board, columns: int, lines: int, colours: bool = False, signs: Signs | None = None, top: int = 0
+) -> str:
     size = os.terminal_size((columns, lines))
-    shown = screen(Source(board), robots(board), size, signs or Signs())
-    return frame(shown, [(Span("the story", "bold"),)], size, colours)
+    signs = signs or Signs()
+    shown = screen(Source(board), robots(board), size, signs, lines - 1, top)
+    return frame(shown, [(Span("the story", "bold"),)], size, colours, signs)
+
+
+def seen(board: Board, columns: int, lines: int, top: int = 0) -> list[str]:
+    """The lines of a screen as text."""
+    text = drawn(board, columns, lines, top=top).removeprefix("\x1b[H").removesuffix("\x1b[K\x1b[J")
+    return text.split("\x1b[K\r\n")
 
 
 def test_a_screen_has_counts_table_details_and_the_footer_at_its_bottom() -> None:
@@ -32,8 +41,12 @@ def test_a_screen_has_counts_table_details_and_the_footer_at_its_bottom() -> Non
     lines = [line.removesuffix("\x1b[K") for line in drawn(board, 80, 24).split("\r\n")]
     assert len(lines) == 24
     assert lines[0] == "\x1b[Hudp:127.0.0.1:14550  2 robots, 1 in error, 1 can move"
-    assert [line[:18].strip() for line in lines[1:4]] == ["robot state", "1.1   ● CAN MOVE", "2.1   ▬ CANNOT MOV"]
-    assert lines[5].startswith("● CAN MOVE  1.1  GROUND_ROVER")
+    assert [line[:18].strip() for line in lines[1:4]] == [
+        "state            r",
+        "◆ FAULT          1",
+        "▪ PARKED         2",
+    ]
+    assert lines[5].startswith("◆ FAULT  1.1  GROUND_ROVER")
     assert lines[-1] == "the story\x1b[K\x1b[J"
 
 
@@ -47,6 +60,39 @@ def test_a_screen_never_scrolls(columns: int, lines: int) -> None:
     rows = shown.removeprefix("\x1b[H").removesuffix("\x1b[J").replace("\x1b[K", "").split("\r\n")
     assert len(rows) == lines
     assert all(len(row) <= columns for row in rows)
+
+
+def fleet(number: int) -> Board:
+    """Robots of which the last one has a trouble."""
+    board = Board()
+    for system in range(1, number):
+        put(board, DRIVING, system=system)
+    put(board, PARKED._replace(in_error=FAILED.in_error), system=number, errors=(CRASH._replace(text="Going to HOLD"),))
+    return board
+
+
+def test_trouble_comes_first_and_what_does_not_fit_is_a_number() -> None:
+    lines = seen(fleet(30), 80, 24)
+    assert lines[2].startswith("▲ CRASHED        30.1  Crashed: “Going to HOLD”.")
+    rows = [line for line in lines if line.startswith(("▶ MOVING ", "▲ CRASHED        "))]
+    assert f"+{30 - len(rows)} more (j, PgDn)" in lines
+    assert "~" not in "".join(lines)
+    later = seen(fleet(30), 80, 24, top=17)
+    assert not any("more" in line for line in later)
+    assert any(line.startswith("▶ MOVING         29.1") for line in later)
+
+
+def test_a_terminal_of_40_by_10_has_word_name_and_cause_of_the_worst() -> None:
+    text = "\n".join(seen(fleet(20), 40, 10))
+    assert "▲ CRASHED  20.1" in text
+    assert "Crashed: “Going to HOLD”." in text
+    assert "more (j, PgDn)" in text
+
+
+@pytest.mark.parametrize("width", [44, 60, 80, 120, 200])
+def test_the_cause_keeps_its_first_twenty_letters(width: int) -> None:
+    row = next(line for line in seen(fleet(3), width, 24) if line.startswith("▲ CRASHED "))
+    assert "Crashed: “Going to H" in row
 
 
 @pytest.mark.parametrize(
@@ -64,7 +110,7 @@ def test_a_side_of_the_terminal_that_is_not_known_is_assumed(
 def test_colours_are_those_of_the_tones() -> None:
     board = Board()
     put(board, FAILED, errors=(RADIO,))
-    assert "\x1b[1;37;41m● CAN MOVE\x1b[0m" in drawn(board, 80, 24, colours=True)
+    assert "\x1b[1;37;41m◆ FAULT\x1b[0m" in drawn(board, 80, 24, colours=True)
     assert "\x1b[1" not in drawn(board, 80, 24)
 
 
@@ -94,10 +140,10 @@ def test_each_change_is_a_line_below_the_titles(pipe: tuple[int, int]) -> None:
     )
     print_changes(source, Signs(), pipe[1])
     lines = os.read(pipe[0], 65536).decode().splitlines()
-    assert lines[0].startswith("time                   robot state             type            flight mode")
-    assert [line[:44].rstrip() for line in lines[1:]] == [
-        "2027-01-15T08:00:00.0Z 1.1   ▬ CANNOT MOVE",
-        "2027-01-15T08:00:01.5Z 1.1   ● CAN MOVE",
+    assert lines[0].startswith("time                   state            robot heard mode")
+    assert [line[:43].rstrip() for line in lines[1:]] == [
+        "2027-01-15T08:00:00.0Z ▪ PARKED         1.1",
+        "2027-01-15T08:00:01.5Z ◆ FAULT          1.1",
     ]
     assert "“Radio Failsafe”" in lines[2]
 
@@ -155,4 +201,6 @@ def test_the_last_lines_of_the_log_are_kept_only() -> None:
 def test_the_lines_of_a_screen_are_spans() -> None:
     board = Board()
     put(board)
-    assert texts(screen(Source(board), robots(board), os.terminal_size((80, 24)), Signs()))[2].startswith("1.1   ▶ ")
+    assert texts(screen(Source(board), robots(board), os.terminal_size((80, 24)), Signs()))[2].startswith(
+        "▶ MOVING         1.1 "
+    )

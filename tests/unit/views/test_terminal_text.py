@@ -11,9 +11,9 @@ from .fleet import texts
 
 
 def test_a_long_text_is_cut_and_marked() -> None:
-    assert fill("PREARM_FAILING", 6) == "PREAR~"
+    assert fill("PREARM_FAILING", 6) == "PREAR…"
     assert fill("CRASH", 5) == "CRASH"
-    assert fill("漢字漢字", 6) == "漢字~ "
+    assert fill("漢字漢字", 6) == "漢字… "
     assert fill("漢字", 5) == "漢字 "
 
 

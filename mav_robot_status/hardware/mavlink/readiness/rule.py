@@ -205,12 +205,14 @@ def inhibit(name: str, text: str | None, before: Detail, now: Instant) -> Inhibi
 
 
 def can_arm(facts: Facts) -> TriState:
-    """What the report says; UNKNOWN while SYS_STATUS contradicts it.
+    """What the report says; UNKNOWN while SYS_STATUS contradicts it. Without reports SYS_STATUS says it.
 
     PX4 reports at most every 2 s, and SYS_STATUS may be newer. For an armed vehicle SYS_STATUS shows something else:
     whether the mode can continue.
     """
     reported, shown = facts.arming.can_arm, facts.sys_status.ready
+    if not facts.kind.profile.texts.sends_events:
+        return UNKNOWN if facts.armed or not facts.fresh.sys_status else shown
     if facts.armed or not facts.fresh.sys_status or UNKNOWN in (reported, shown):
         return reported
     return reported if reported is shown else UNKNOWN

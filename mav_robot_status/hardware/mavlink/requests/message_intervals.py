@@ -112,6 +112,8 @@ class Requests:
         """Messages whose interval the autopilot has told in this round."""
         self._tells = True
         """Whether the autopilot answers MAV_CMD_GET_MESSAGE_INTERVAL, as far as known."""
+        self.asked_at: dict[str, float] = {}
+        """When each message was requested last, monotonic seconds, by its name."""
         self._asked_once = False
         self.checks_asked = False
         """Whether MAV_CMD_RUN_PREARM_CHECKS was sent, on this connection and since this boot."""
@@ -240,6 +242,8 @@ class Requests:
                 log.debug("%d.%d does not answer: %s", *self._ids, command.what)
                 continue
             command.tries += 1
+            if command.command == MAV_CMD_SET_MESSAGE_INTERVAL:
+                self.asked_at[command.what] = now
             command.due = now + PATIENCE
             return mav.CommandLong(
                 *command.params, 0.0, 0.0, 0.0, 0.0, 0.0, command.command, *self._ids, confirmation=command.tries - 1

@@ -92,6 +92,18 @@ class RequestScheduler:
             waiting.append(f"{len(names)} parameters from {names[0]} on")
         return "vehicle {}.{}: {}".format(*tracked.ids, ", ".join(waiting)) if waiting else None
 
+    def names(self, tracked: TrackedVehicle) -> list[str]:
+        """The names of the messages that the status of a vehicle needs."""
+        state = tracked.state
+        return [] if state is None else [w.name for w in wanted_of(state.profile, state.family, self._watch_outputs)]
+
+    def asked(self, tracked: TrackedVehicle, now: float) -> dict[str, str]:
+        """What is known about the request for each wanted message of a vehicle, in words."""
+        if tracked.ids in self._passive:
+            return dict.fromkeys(self.names(tracked), "mav-robot-status does not ask for it (passive).")
+        asked_at = {} if tracked.requests is None else tracked.requests.asked_at
+        return {name: f"Asked for {now - at:.0f} s ago, no answer." for name, at in asked_at.items()}
+
     def due(
         self,
         vehicles: Mapping[tuple[int, int], TrackedVehicle],

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from ....interface.status import RobotMode
 from ..facts import Cause, Seldom
 from ..heartbeat.rule import actuators_blocked, is_initialising
-from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason
+from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason, off
 from .failure_flags import failures
 from .state import speed
 
@@ -78,7 +78,7 @@ def motion_possible(facts: Facts, options: HardwareOptions, mode: FlightMode, dr
     """Impossible without power; otherwise unknown, because the state is."""
     powered, why = drives
     if powered is FALSE:
-        return FALSE, why._replace(rule=f"drives_powered is false: {why.rule}")
+        return FALSE, why._replace(rule=off(why.rule))
     if options.manual_blocks_motion and mode.mode is RobotMode.MANUAL:
         return FALSE, Reason("manual mode (manual_blocks_motion)", high_latency_words)
     if powered is UNKNOWN:

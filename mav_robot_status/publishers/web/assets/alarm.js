@@ -1,107 +1,109 @@
-// Alarms: each new error, stop and loss is marked and sounds once, until a person acknowledges it.
+// The events of all robots, and those that wait for a person: the gateway keeps both, so that they are the same in each
+// browser. Only the loss of the gateway itself is known here alone.
 
-import { FIELDS, LINK, looks } from "./words.js";
-import { isolated, make, setText } from "./make.js";
-import { members, title } from "./robot.js";
+import { chip, isolated, make, setText } from "./make.js";
+import { clock } from "./words.js";
 
 const SHOWN = 5; // lines
+const KEPT = 200; // events
+const EVERY = 1000; // ms between two drawings of the events
 const BEEP = 0.18; // s
-const STOP = FIELDS.find(({ name }) => name === "e_stopped");
-const PAGE = ""; // the handle of the page itself
-
-/** What is wrong with a robot now, as [name, words]. A loss does not end an error. */
-export function wrong(robot, before) {
-  const found = new Map();
-  if (!robot.heard()) {
-    for (const [name, words] of before) if (name !== "lost") found.set(name, words);
-    if (robot.line.link?.state !== "NEVER_SEEN") found.set("lost", looks(LINK, "LOST").word);
-    return found;
-  }
-  if (robot.line.e_stopped === true) found.set("stopped", `${STOP.title}: ${looks(STOP, true).word}`);
-  for (const cause of robot.said.causes) if (cause.list === "errors") found.set(`error ${cause.name} ${cause.handle ?? ""}`, cause.words);
-  return found;
-}
+const at = (id) => document.getElementById(id);
 
 export class Alarms {
-  constructor() {
+  /** `send(handle)` tells the gateway that a person has seen the alarms of a robot, or of all (null). */
+  constructor(send) {
+    this.send = send;
     this.on = false;
-    this.active = new Map();
-    this.pending = new Map();
+    this.pending = [];
+    this.news = [];
+    this.gone = null; // the loss of the gateway: [words, time, whether a person has seen it]
     this.sound = null;
-    this.button = document.getElementById("sound");
+    this.button = at("sound");
     this.button.addEventListener("click", (event) => {
       event.stopPropagation();
       if (this.sound === null) this.unmute();
       else this.mute();
     });
     this.first = () => this.unmute();
-    document.getElementById("acknowledge").addEventListener("click", () => this.acknowledge());
+    at("acknowledge").addEventListener("click", () => this.acknowledge());
   }
 
-  /** Turn the alarms on or off, as the gateway says. */
+  /** Turn the alarms on or off, as the gateway says. A gateway that began anew has other events. */
   enable(on) {
-    if (on === this.on) return;
+    at("log").replaceChildren();
+    this.pending = [];
+    this.news = [];
+    if (on && !this.on) document.addEventListener("click", this.first, { once: true });
     this.on = on;
-    if (on) document.addEventListener("click", this.first, { once: true });
     this.show();
   }
 
-  /** Look at all robots, and at the page's own connection: `gone` are words, or null. */
-  take(robots, gone) {
-    if (!this.on) return;
-    let news = false;
-    const there = new Set(robots.map(({ line }) => line.handle));
-    for (const robot of gone === null ? robots : []) {
-      const { handle } = robot.line;
-      if (members(robot.line).some((name) => there.has(name))) continue; // its members say it
-      news = this.compare(handle, title(robot.line), wrong(robot, this.active.get(handle) ?? new Map())) || news;
+  /** New events, and all that wait for a person; either may be absent. */
+  take(events = [], pending = null) {
+    this.news = [...this.news, ...events].slice(-KEPT);
+    if (this.news.length && !this.timer) {
+      this.list();
+      this.timer = setTimeout(() => {
+        this.timer = null;
+        this.list();
+      }, EVERY);
     }
-    if (gone === null) for (const handle of [...this.active.keys()]) if (handle !== PAGE && !there.has(handle)) this.active.delete(handle);
-    news = this.compare(PAGE, "", gone === null ? new Map() : new Map([["gone", gone]])) || news;
-    if (news) this.beep();
-    if (news) this.show();
+    if (pending) this.pending = pending;
+    if (!this.on || !pending) return;
+    if (events.some((one) => one.what === "begins" && this.pending.some((other) => other.version === one.version))) this.beep();
+    this.show();
   }
 
-  compare(handle, name, now) {
-    const before = this.active.get(handle) ?? new Map();
-    let news = false;
-    for (const [what, words] of now) {
-      if (before.has(what)) continue;
-      this.pending.set(`${handle}\n${what}`, { handle, name, words, at: new Date() });
-      news = true;
-    }
-    this.active.set(handle, now);
-    return news;
+  /** Add the news to the list of events. */
+  list() {
+    const log = at("log");
+    log.prepend(...this.news.map(item).reverse());
+    this.news = [];
+    while (log.childElementCount > KEPT) log.lastChild.remove();
+    at("events").hidden = log.childElementCount === 0;
   }
 
-  /** A person has seen what is marked, of one robot or of all. */
+  /** Whether nothing arrives from the gateway: words, or null. */
+  lost(words) {
+    if (!this.on || (words === null) === (this.gone === null)) return;
+    this.gone = words === null ? null : [words, new Date(), false];
+    if (words !== null) this.beep();
+    this.show();
+  }
+
   acknowledge(handle = null) {
-    for (const [key, one] of this.pending) if (handle === null || one.handle === handle) this.pending.delete(key);
+    if (handle === null && this.gone) this.gone[2] = true;
+    this.send(handle);
     this.show();
   }
 
   /** The robots with a mark. */
   marked() {
-    return new Set([...this.pending.values()].map(({ handle }) => handle));
+    return new Set(this.on ? this.pending.map(({ handle }) => handle) : []);
   }
 
   show() {
-    document.getElementById("alarms").hidden = this.pending.size === 0;
-    const newest = [...this.pending.values()].reverse();
-    const items = newest.slice(0, SHOWN).map((one) => this.item(one));
+    const gone = this.gone !== null && !this.gone[2];
+    at("alarms").hidden = !this.on || !(this.pending.length || gone);
+    const newest = [...this.pending].reverse();
+    const items = newest.slice(0, SHOWN).map((one) => waiting(one, () => this.acknowledge(one.handle)));
+    if (gone) items.unshift(this.page());
     if (newest.length > SHOWN) items.push(make("li", {}, `and ${newest.length - SHOWN} more`));
-    document.getElementById("alarm-list").replaceChildren(...items);
+    at("alarm-list").replaceChildren(...items);
     this.button.hidden = !this.on;
     setText(this.button, this.sound ? "Sound on" : "Sound off: click once to turn it on");
     this.button.setAttribute("aria-pressed", `${this.sound !== null}`);
   }
 
-  item({ handle, name, words, at }) {
-    const when = make("time", { datetime: at.toISOString() }, at.toLocaleTimeString([], { hourCycle: "h23" }));
-    const text = make("span", {}, make("b", {}, "NEW "), when, " ", isolated(name), name ? ": " : "", isolated(words));
-    const button = make("button", { type: "button", class: "plain", "aria-label": `Acknowledge ${name || "the page"}` }, "Acknowledge");
-    button.addEventListener("click", () => this.acknowledge(handle));
-    return make("li", {}, text, button);
+  /** The line of a lost gateway. It cannot keep that a person has seen this. */
+  page() {
+    const button = make("button", { type: "button", class: "plain" }, "Acknowledge in this browser only");
+    button.addEventListener("click", () => {
+      this.gone[2] = true;
+      this.show();
+    });
+    return make("li", {}, make("span", {}, make("b", {}, "NEW "), clock(this.gone[1]), " ", this.gone[0]), button);
   }
 
   /** Browsers allow sound after a click. */
@@ -132,4 +134,21 @@ export class Alarms {
       tone.stop(currentTime + delay + BEEP);
     }
   }
+}
+
+/** Time, robot, state and cause of an event. */
+function told({ stamp, name, word, shape, tone, what, why }) {
+  const ended = what === "begins" ? tone : "calm";
+  const words = what === "acknowledged" ? `${why} (acknowledged)` : why;
+  return [make("time", { datetime: stamp }, clock(stamp)), " ", isolated(name), " ", chip({ shape, word, tone: ended }), " ", isolated(words)];
+}
+
+function item(event) {
+  return make("li", { class: event.what }, ...told(event));
+}
+
+function waiting(event, acknowledge) {
+  const button = make("button", { type: "button", class: "plain", "aria-label": `Acknowledge ${event.name}` }, "Acknowledge");
+  button.addEventListener("click", acknowledge);
+  return make("li", {}, make("span", {}, make("b", {}, "NEW "), ...told(event)), button);
 }

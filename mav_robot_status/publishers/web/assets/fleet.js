@@ -1,11 +1,13 @@
-// The table of robots, one line each, and that of the members of a group. Rows are updated in place, so that keyboard
-// focus is kept.
+// The table of robots, one line each, and that of the members of a group. Rows and cells are updated in place: a row keeps
+// the keyboard focus, and only what changes is drawn.
 
-import { FIELDS, LINK, looks, plain, span } from "./words.js";
-import { chip, make, setText, told } from "./make.js";
+import { ago, FIELDS, LINK, looks, plain } from "./words.js";
+import { chip, make, setText, told, turn } from "./make.js";
 import { ids, kind, members, title } from "./robot.js";
 
 const HELD = 2; // s after a movement of the pointer over the table during which no row changes its place
+const URGENT = 5; // a robot whose rank is below this comes to its place at once, any other with the next order
+const UNSEEN = 1; // s after which rows outside the window are drawn again
 const FIELD_COLUMNS = FIELDS.map((field) => ({ head: field.head, field, of: (robot) => place(field, robot.value(field.name)) }));
 const COLUMNS = [
   { head: "State", of: (robot) => robot.headline().rank },
@@ -50,10 +52,20 @@ export function sorted(robots, column = COLUMNS[0], down = false) {
   return [...new Set([...top.flatMap((robot) => [robot, ...(below.get(robot) ?? [])]), ...order])];
 }
 
+/** The robots that count: not a group whose members have rows. */
+export function counted(robots) {
+  const there = new Set(robots.map(({ line }) => line.handle));
+  return robots.filter(({ line }) => !members(line).some((handle) => there.has(handle)));
+}
+
 /** The rows of some robots. */
 export class Rows {
   constructor(head, body) {
     this.rows = new Map();
+    this.drawnAt = -Infinity;
+    this.looking = new IntersectionObserver((found) => {
+      for (const { target, isIntersecting } of found) target.isSeen = isIntersecting;
+    }, { rootMargin: "200px" });
     this.body = document.getElementById(body);
     this.head = document.getElementById(head);
     for (const column of COLUMNS) this.head.append(this.header(column));
@@ -68,17 +80,23 @@ export class Rows {
     const focused = document.activeElement;
     const seen = new Set();
     const below = new Set(robots.flatMap(({ line }) => members(line)));
+    const now = performance.now() / 1000;
+    const all = now - this.drawnAt >= UNSEEN;
+    if (all) this.drawnAt = now;
     let after = null;
     for (const robot of robots) {
-      const row = this.row(robot);
+      const known = this.rows.get(robot.line.handle);
+      const next = after === null ? this.body.firstChild : after.nextSibling;
+      const waits = known !== undefined && !all && known.row === next && known.row.isSeen === false;
+      const row = waits ? known.row : this.row(robot);
       row.classList.toggle("member", below.has(robot.line.handle));
       seen.add(robot.line.handle);
-      const next = after === null ? this.body.firstChild : after.nextSibling;
       if (next !== row) this.body.insertBefore(row, next);
       after = row;
     }
     for (const [handle, { row }] of this.rows) {
       if (seen.has(handle)) continue;
+      this.looking.unobserve(row);
       row.remove();
       this.rows.delete(handle);
     }
@@ -91,7 +109,7 @@ export class Rows {
     for (const robot of robots) {
       const known = this.rows.get(robot.line.handle);
       if (!known) continue;
-      setText(known.age, robot.line.link?.state === "NEVER_SEEN" ? "" : span(robot.currentAge()));
+      setText(known.age, robot.line.link?.state === "NEVER_SEEN" ? "" : ago(robot.currentAge()));
       if (known.stale !== robot.stale()) this.row(robot);
     }
   }
@@ -101,42 +119,53 @@ export class Rows {
     let known = this.rows.get(line.handle);
     if (known?.said === robot.said && known.line === line && known.stale === robot.stale()) return known.row;
     if (!known) {
-      known = { row: make("tr", { role: "row" }), link: make("a", { href: `#/${encodeURIComponent(line.handle)}` }), age: make("span", { class: "age" }) };
-      known.ids = make("small");
-      known.head = make("th", { role: "rowheader", scope: "row" }, known.link, " ", known.ids);
-      this.rows.set(line.handle, known);
+      this.rows.set(line.handle, (known = newRow(line.handle)));
+      this.looking.observe(known.row);
     }
     Object.assign(known, { line, said: robot.said, stale: robot.stale() });
     const headline = robot.headline();
     setText(known.link, title(line));
     setText(known.ids, ids(line));
-    known.head.title = `${title(line)} · ${kind(line)} · ${line.handle}`;
-    const focused = document.activeElement === known.link;
-    const state = make("td", { role: "cell", class: "state" }, chip(headline));
-    known.row.replaceChildren(state, known.head, why(headline), ...FIELDS.map((field) => cell(field, robot)), linked(robot, known.age));
-    if (focused) known.link.focus({ preventScroll: true });
-    known.row.className = headline.tone;
+    setTitle(known.head, `${title(line)} · ${kind(line)} · ${line.handle}`);
+    turn(known.state, headline);
+    if (known.told !== headline.sentences) {
+      known.told = headline.sentences;
+      setTitle(known.why.parentNode, headline.sentences.map(plain).join(" "));
+      known.why.replaceChildren(...told(headline.sentences));
+    }
+    FIELDS.forEach((field, n) => showField(known.fields[n], field, robot));
+    const link = looks(LINK, robot.stale() ? undefined : line.link?.state);
+    turn(known.connection, { ...link, word: link.short });
+    const tone = `${headline.tone}${known.row.classList.contains("member") ? " member" : ""}${known.row.classList.contains("new") ? " new" : ""}`;
+    if (known.row.className !== tone) known.row.className = tone;
     return known.row;
   }
 }
 
-function cell(field, robot) {
+function newRow(handle) {
+  const empty = { shape: "unknown", word: "", tone: "unknown" };
+  const known = { link: make("a", { href: `#/${encodeURIComponent(handle)}` }), ids: make("small"), age: make("span", { class: "age" }) };
+  known.head = make("th", { role: "rowheader", scope: "row" }, known.link, " ", known.ids);
+  known.state = chip(empty);
+  known.why = make("span");
+  known.fields = FIELDS.map(() => chip(empty));
+  known.connection = chip(empty);
+  const cell = (name, head, ...children) => make("td", { role: "cell", class: name, "data-head": head }, ...children);
+  known.row = make("tr", { role: "row" }, cell("state", "State", known.state), known.head, cell("why-cell", "Why", known.why));
+  known.row.append(...FIELDS.map((field, n) => cell("field", field.head, known.fields[n])), cell("link", LINK.head, known.connection, " ", known.age));
+  return known;
+}
+
+function showField(shown, field, robot) {
   const look = looks(field, robot.value(field.name));
-  const shown = make("td", { role: "cell", class: "field", "data-head": field.head }, chip({ ...look, word: look.short }));
+  turn(shown, { ...look, word: look.short });
   const mode = field.name === "mode" ? robot.line.vehicle?.flight_mode : null;
   const code = field.name === "in_error" && robot.value("in_error") === true ? ` ${robot.line.error_code}` : "";
-  shown.title = `${field.title}: ${look.word}${code}${mode ? ` (${mode})` : ""}`;
-  return shown;
+  setTitle(shown.parentNode, `${field.title}: ${look.word}${code}${mode ? ` (${mode})` : ""}`);
 }
 
-function why(headline) {
-  const words = headline.sentences.map(plain).join(" ");
-  return make("td", { role: "cell", class: "why-cell", "data-head": "Why", title: words }, make("span", {}, ...told(headline.sentences)));
-}
-
-function linked(robot, age) {
-  const look = looks(LINK, robot.stale() ? undefined : robot.line.link?.state);
-  return make("td", { role: "cell", class: "link", "data-head": LINK.head }, chip({ ...look, word: look.short }), " ", age);
+function setTitle(element, text) {
+  if (element.title !== text) element.title = text;
 }
 
 /** All robots: filters with their counts, search, sorting. */
@@ -147,7 +176,8 @@ export class Fleet extends Rows {
     this.down = false;
     this.filter = FILTERS[0];
     this.order = [];
-    this.pointed = -Infinity;
+    this.problems = "";
+    this.orderedAt = this.pointed = -Infinity;
     this.body.addEventListener("pointermove", () => (this.pointed = performance.now() / 1000));
     this.buttons = FILTERS.map((filter) => this.button(filter));
     document.getElementById("filters").append(...this.buttons);
@@ -189,29 +219,40 @@ export class Fleet extends Rows {
 
   /** Show the same robots again, after a person asked for another order or choice. */
   again() {
-    this.pointed = -Infinity;
-    this.showAll(this.robots ?? []);
+    this.orderedAt = this.pointed = -Infinity;
+    this.showAll(this.robots ?? [], this.leftOut);
   }
 
-  showAll(robots) {
-    this.robots = robots;
-    const held = performance.now() / 1000 - this.pointed < HELD;
-    const order = sorted(robots, this.column, this.down);
-    if (held) order.sort((a, b) => at(this.order, a) - at(this.order, b));
-    this.order = order.map(({ line }) => line.handle);
+  showAll(robots, leftOut = 0) {
+    [this.robots, this.leftOut] = [robots, leftOut];
+    const order = this.held(sorted(robots, this.column, this.down));
     const text = this.search.value.trim().toLowerCase();
     const found = order.filter((robot) => this.filter.has(robot) && (text === "" || words(robot).includes(text)));
     this.show(found);
-    this.count(robots);
+    this.count(robots, leftOut);
     document.getElementById("empty").hidden = robots.length > 0;
     document.getElementById("none").hidden = robots.length === 0 || found.length > 0;
-    this.wall(found.length);
+    this.spread(found.length);
   }
 
-  count(robots) {
-    // a group whose members have rows is not counted again
-    const there = new Set(robots.map(({ line }) => line.handle));
-    const single = robots.filter(({ line }) => !members(line).some((handle) => there.has(handle)));
+  /** In the order of before while a person points at a row, or if nobody has another urgent problem than a moment ago. */
+  held(order) {
+    const now = performance.now() / 1000;
+    const problems = order.filter((robot) => robot.headline().rank < URGENT).map((robot) => `${robot.headline().rank} ${robot.line.handle}`).join("\n");
+    const same = problems === this.problems && order.length === this.order.length && now - this.orderedAt < HELD;
+    if (now - this.pointed < HELD || same) {
+      const places = new Map(this.order.map((handle, n) => [handle, n]));
+      const placeOf = ({ line }) => places.get(line.handle) ?? places.size;
+      order.sort((a, b) => placeOf(a) - placeOf(b));
+    } else {
+      [this.orderedAt, this.problems] = [now, problems];
+    }
+    this.order = order.map(({ line }) => line.handle);
+    return order;
+  }
+
+  count(robots, leftOut) {
+    const single = counted(robots);
     FILTERS.forEach((filter, n) => {
       const count = single.filter(filter.has).length;
       setText(this.buttons[n].firstChild, `${count}`);
@@ -219,21 +260,32 @@ export class Fleet extends Rows {
       this.buttons[n].classList.toggle("some", count > 0);
     });
     this.errors = single.filter(FILTERS[1].has).length;
+    setText(document.getElementById("fleet-title"), number(single.length));
+    setText(document.getElementById("left-out"), left(leftOut));
   }
 
   /** On a wide screen, robots that do not fit below each other stand in columns. */
-  wall(rows) {
+  spread(rows) {
+    const shape = `${rows} ${innerWidth} ${innerHeight}`;
+    if (shape === this.shape || !rows) return;
+    this.shape = shape;
     const fit = Math.max(Math.floor((innerHeight - this.body.getBoundingClientRect().top - scrollY) / 32), 10);
-    const columns = innerWidth < 1600 ? 1 : Math.min(Math.ceil(rows / fit), Math.floor(innerWidth / 620));
-    document.body.classList.toggle("wall", columns > 1);
+    const needed = innerWidth < 1600 ? 1 : Math.ceil(rows / fit);
+    const columns = needed <= innerWidth / 620 ? needed : 1;
+    document.body.classList.toggle("columns", columns > 1);
     document.body.style.setProperty("--columns", columns);
   }
 }
 
-/** Where a robot was; a new one is last. */
-function at(order, robot) {
-  const found = order.indexOf(robot.line.handle);
-  return found < 0 ? order.length : found;
+/** `254 robots`. */
+export function number(count) {
+  return count === 1 ? "1 robot" : `${count} robots`;
+}
+
+/** How many senders the gateway leaves out, in words; empty: none. */
+export function left(count) {
+  if (!count) return "";
+  return `${count} more ${count === 1 ? "sender is" : "senders are"} not shown: the gateway has no room for ${count === 1 ? "it" : "them"}.`;
 }
 
 /** What a search looks at. */

@@ -25,17 +25,27 @@ export function shape(name) {
 }
 
 /** Shape and word of a value. */
-export function chip({ shape: name, word, tone }) {
-  return make("span", { class: `chip ${tone}` }, shape(name), make("span", {}, word));
+export function chip(look) {
+  return turn(make("span", {}, shape(look.shape), make("span")), look);
+}
+
+/** Let a chip show another look; what is the same stays. */
+export function turn(made, { shape: name, word, tone }) {
+  const [drawing, text] = made.children;
+  const use = drawing.firstChild;
+  if (use.getAttribute("href") !== `#${name}`) use.setAttribute("href", `#${name}`);
+  setText(text, word);
+  if (made.className !== `chip ${tone}`) made.className = `chip ${tone}`;
+  return made;
 }
 
 /** Sentences of the gateway. The words of the autopilot are quoted, and nothing in them affects other text. */
 export function told(sentences) {
-  return sentences.flatMap(({ text, at, quote }, n) => {
+  return sentences.flatMap(({ text, at, quote, rest }, n) => {
     const parts = [n ? " " : "", isolated(text)];
     if (at) parts.push(" ", make("time", { datetime: at }, clock(at)));
     if (quote) parts.push(" “", isolated(quote), "”");
-    return [...parts, /[.:]$/.test(text) ? "" : "."];
+    return [...parts, rest ?? "", text.endsWith(".") ? "" : "."];
   });
 }
 

@@ -6,6 +6,7 @@ import { Robot } from "./robot.js";
 import { Stream } from "./stream.js";
 import { VehiclePage } from "./vehicle.js";
 import { chip, setText } from "./make.js";
+import * as wall from "./wall.js";
 import { clock, LINK, looks, span } from "./words.js";
 
 const TOKEN = "mav-robot-status token";
@@ -13,10 +14,14 @@ const LIST = "?all"; // the address of the list, even if it has a single robot
 const at = (id) => document.getElementById(id);
 const seconds = () => performance.now() / 1000;
 
-const page = { robots: new Map(), state: "connecting", receivedAt: null, receivedStamp: null, standing: null, staleAfter: null, wanted: null, list: false };
+document.body.classList.toggle("wall", wall.isWall);
+const page = { robots: new Map(), leftOut: 0, state: "connecting", receivedAt: null, receivedStamp: null, standing: null, staleAfter: null, wanted: null, list: false };
 const fleet = new Fleet();
 const one = new VehiclePage();
-const alarms = new Alarms();
+const alarms = new Alarms((handle) => {
+  const headers = { "X-Requested-With": "mav-robot-status", ...authorization() };
+  fetch(`api/v1/acknowledge${handle === null ? "" : `?handle=${encodeURIComponent(handle)}`}`, { method: "POST", headers });
+});
 let stream = null;
 
 const on = {
@@ -24,6 +29,7 @@ const on = {
     const now = seconds();
     if (name === "history") return data.handle === one.handle && (one.take(data, now), render());
     if (name === "explanation") return data.handle === one.handle && one.explain(data);
+    if (name === "about") return page.robots.get(data.handle)?.tell(data);
     [page.state, page.receivedAt, page.receivedStamp, page.standing] = ["live", now, data.now, data.standing];
     if (name === "board") {
       page.robots.clear();
@@ -32,11 +38,14 @@ const on = {
       at("source").title = `mav-robot-status ${data.version}`;
       alarms.enable(data.alarm === true);
     }
+    page.leftOut = data.left_out;
     for (const line of data.vehicles) {
       const known = page.robots.get(line.handle);
-      if (known) known.set(line, data.headlines?.[line.handle]);
-      else page.robots.set(line.handle, new Robot(line, data.headlines?.[line.handle]));
+      if (known) known.set(line);
+      else page.robots.set(line.handle, new Robot(line));
     }
+    for (const [handle, said] of Object.entries(data.headlines)) page.robots.get(handle)?.say(said);
+    alarms.take(data.events, data.pending);
     for (const [handle, beat] of Object.entries(data.beats ?? {})) page.robots.get(handle)?.heartbeat(...beat);
     // `beats` names every robot that the gateway has
     if (data.beats) for (const handle of [...page.robots.keys()]) if (!(handle in data.beats)) page.robots.delete(handle);
@@ -65,7 +74,7 @@ function wanted() {
 
 /** Turn to the robot to show. */
 function turn() {
-  if (wanted() === one.handle) return;
+  if (wall.isWall || wanted() === one.handle) return;
   one.open(wanted());
   connect();
 }
@@ -77,7 +86,11 @@ function render() {
   at("fleet").hidden = denied || one.handle !== null || page.receivedAt === null;
   at("vehicle").hidden = denied || one.handle === null || page.receivedAt === null;
   freeze();
-  if (one.handle === null) fleet.showAll([...page.robots.values()]);
+  at("wall").hidden = denied || !wall.isWall;
+  if (wall.isWall) {
+    at("fleet").hidden = true;
+    wall.show([...page.robots.values()], page.leftOut);
+  } else if (one.handle === null) fleet.showAll([...page.robots.values()], page.leftOut);
   else if (robot) one.show(robot, page.robots);
   else {
     if (one.line) one.open(one.handle);
@@ -100,15 +113,16 @@ function age() {
     live: { shape: "bars", word: "live", tone: "calm" },
     connecting: { shape: "ring", word: "connecting …", tone: "unknown" },
     lost: { ...looks(LINK, "LOST"), word: "NOT CONNECTED" },
-    denied: { shape: "bar", word: "token needed", tone: "warning" },
+    denied: { shape: "locked", word: "token needed", tone: "warning" },
   };
   const look = page.standing !== null && page.state === "live" ? { ...states.lost, word: "STALLED" } : states[page.state];
   if (at("connection").textContent !== look.word) at("connection").replaceChildren(chip(look));
   const robot = page.robots.get(one.handle);
-  if (one.handle === null) fleet.age(page.robots.values());
+  if (wall.isWall) wall.tick(page.receivedStamp);
+  else if (one.handle === null) fleet.age(page.robots.values());
   else if (robot) one.age(robot, live, seconds());
   warn();
-  alarms.take([...page.robots.values()], at("banner").hidden ? null : "nothing arrives from the gateway");
+  alarms.lost(at("banner").hidden ? null : "Nothing arrives from the gateway.");
   mark();
 }
 
@@ -131,6 +145,11 @@ function warn() {
   setText(banner, lost ? `No connection to the gateway${since}. Trying again.` : `The gateway has been stalled for ${span(page.standing)}. What it last said may be old.`);
 }
 
+function authorization() {
+  const token = sessionStorage.getItem(TOKEN);
+  return token === null ? {} : { Authorization: `Bearer ${token}` };
+}
+
 function route() {
   let handle = null;
   try {
@@ -146,7 +165,7 @@ function route() {
   page.list = location.hash === `#${LIST}`;
   page.wanted = page.list ? null : handle;
   const moved = stream !== null;
-  one.open(wanted());
+  if (!wall.isWall) one.open(wanted());
   connect();
   render();
   if (moved) {
@@ -157,7 +176,7 @@ function route() {
 
 function connect() {
   stream?.close();
-  stream = new Stream(one.handle, sessionStorage.getItem(TOKEN), on);
+  stream = new Stream(one.handle, authorization(), on);
 }
 
 at("token").addEventListener("submit", (event) => {
@@ -168,7 +187,7 @@ at("token").addEventListener("submit", (event) => {
   render();
 });
 addEventListener("hashchange", route);
-addEventListener("resize", () => one.handle === null && fleet.again());
+addEventListener("resize", () => (wall.isWall ? render() : one.handle === null && fleet.again()));
 // a page that the browser keeps for its back button must not keep a connection
 addEventListener("pagehide", () => stream.close());
 addEventListener("pageshow", (event) => event.persisted && connect());

@@ -3,19 +3,30 @@
 import { gone } from "./words.js";
 
 const seconds = () => performance.now() / 1000;
-const NOTHING = { word: "", shape: "unknown", tone: "unknown", rank: 0, sentences: [], step: "", topic: "", causes: [], last: null };
+const NOTHING = { word: "", shape: "unknown", tone: "unknown", rank: 0, sentences: [], step: "", topic: "" };
 
 export class Robot {
-  constructor(line, headline) {
+  constructor(line) {
     this.frozen = null;
     this.staleAfter = null;
-    this.set(line, headline);
+    this.said = NOTHING;
+    this.about = { causes: [], last: null };
+    this.set(line);
   }
 
-  /** A new line with its headline. */
-  set(line, headline) {
+  /** What the gateway says of it. */
+  say(headline) {
+    this.said = headline;
+  }
+
+  /** Its causes, and what was known before its link was lost. The page of one robot has them. */
+  tell(about) {
+    this.about = about;
+  }
+
+  /** A new line. */
+  set(line) {
     this.line = line;
-    this.said = headline ?? NOTHING;
     this.heartbeat(line.stamp, line.link?.heartbeat_age ?? null, 0);
   }
 
@@ -49,7 +60,7 @@ export class Robot {
 
   /** The last known value of a field; undefined while it is heard, or if there was none. */
   last(name) {
-    if (this.line.link?.state !== "CONNECTED") return this.said.last?.[name];
+    if (this.line.link?.state !== "CONNECTED") return this.about.last?.[name];
     return this.stale() ? this.line[name] : undefined;
   }
 }

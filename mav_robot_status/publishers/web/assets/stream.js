@@ -5,9 +5,9 @@ const RETRY = 1000; // ms
 
 /** Follows the stream until `close`; `on` has open(), event(name, data), lost(), denied(). */
 export class Stream {
-  constructor(handle, token, on) {
+  constructor(handle, headers, on) {
     this.query = handle === null ? "" : `?handle=${encodeURIComponent(handle)}`;
-    this.token = token;
+    this.headers = headers;
     this.on = on;
     this.closed = false;
     this.follow();
@@ -23,8 +23,7 @@ export class Stream {
     this.abort = new AbortController();
     this.listen();
     try {
-      const headers = this.token === null ? {} : { Authorization: `Bearer ${this.token}` };
-      const answer = await fetch(`events${this.query}`, { headers, signal: this.abort.signal, cache: "no-store" });
+      const answer = await fetch(`events${this.query}`, { headers: this.headers, signal: this.abort.signal, cache: "no-store" });
       if (answer.status === 401) {
         if (!this.closed) this.on.denied();
         this.close();

@@ -4,7 +4,7 @@ import { Rows } from "./fleet.js";
 import { bands } from "./bands.js";
 import { chip, isolated, make, setText, shape, told } from "./make.js";
 import { kind, members, title } from "./robot.js";
-import { clock, FIELDS, lastKnown, LINK, looks, span } from "./words.js";
+import { ago, clock, FIELDS, lastKnown, LINK, looks } from "./words.js";
 
 const WHY = ["Field", "Value", "Rule", "Read from", "Age"];
 const MOST_CHANGES = 60;
@@ -23,7 +23,7 @@ export class VehiclePage {
   open(handle) {
     this.handle = handle;
     this.line = null;
-    this.history = { transitions: [], knownFor: 0, at: 0 };
+    this.history = { transitions: [], since: new Map() };
     this.explanation = null;
     for (const id of ["verdict", "causes", "tiles", "bands", "why", "changes"]) at(id).replaceChildren();
     this.members.show([]);
@@ -36,9 +36,11 @@ export class VehiclePage {
   /** Add the whole history, or its new part. Ages count from `now`. */
   take(data, now) {
     const news = data.transitions.map((t) => ({ ...t, at: now - t.ago }));
+    const ago = (stamp) => (new Date(data.now) - new Date(stamp)) / 1000;
+    const since = new Map(Object.entries(data.kept_since).map(([name, stamp]) => [name, now - ago(stamp)]));
     const kept = data.whole ? [] : this.history.transitions;
-    const transitions = [...kept, ...news].filter((t) => now - t.at <= WINDOW || t.at > now);
-    this.history = { transitions, since: now - data.known_for };
+    const transitions = [...kept, ...news].filter((t) => now - t.at <= WINDOW && t.at >= since.get(t.name) - 0.01);
+    this.history = { transitions, since };
     const recent = withoutTheLost(transitions).slice(-MOST_CHANGES).reverse();
     at("changes").replaceChildren(...recent.map(change));
   }
@@ -53,15 +55,15 @@ export class VehiclePage {
     this.parts = members(robot.line).map((handle) => robots.get(handle)).filter((part) => part);
     at("members").hidden = this.parts.length === 0;
     this.members.show(this.parts);
-    if (this.line === robot.line && this.said === robot.said && this.stale === robot.stale()) return;
+    if (this.line === robot.line && this.said === robot.said && this.about === robot.about && this.stale === robot.stale()) return;
     const line = (this.line = robot.line);
-    [this.said, this.stale] = [robot.said, robot.stale()];
+    [this.said, this.about, this.stale] = [robot.said, robot.about, robot.stale()];
     setText(at("vehicle-title"), title(line));
     setText(at("who"), [kind(line), title(line) === line.handle ? "" : line.handle].filter((part) => part).join(" · "));
     const headline = robot.headline();
     at("verdict").className = headline.tone;
     at("verdict").replaceChildren(...banner(headline));
-    at("causes").replaceChildren(...causeLists(line, headline));
+    at("causes").replaceChildren(...causeLists(line, this.stale ? [] : robot.about.causes));
     at("tiles").replaceChildren(...FIELDS.map((field) => tile(field, robot)), linkTile(robot));
     if (this.stale) {
       // the reasons are those of a status that is not known any more
@@ -81,12 +83,12 @@ export class VehiclePage {
     if (this.line && this.stale !== robot.stale()) this.show(robot, new Map((this.parts ?? []).map((part) => [part.line.handle, part])));
     const asof = at("asof");
     if (!asof || !this.line) return;
-    const age = this.line.link?.state === "NEVER_SEEN" ? "no heartbeat yet" : `last heartbeat ${span(robot.currentAge())} ago`;
-    setText(asof, live && !robot.stale() ? `now, ${age}` : `as of ${clock(robot.stamp)}, ${age}`);
+    const age = this.line.link?.state === "NEVER_SEEN" ? "no heartbeat yet" : `heard ${ago(robot.currentAge())}`;
+    setText(asof, live && !robot.stale() ? age : `as of ${clock(robot.stamp)}`);
     setText(at("link-age"), age);
-    const ago = this.history.transitions.map((t) => ({ ...t, ago: now - t.at }));
-    const known = { transitions: ago, knownFor: now - (this.history.since ?? now) };
-    at("bands").replaceChildren(...bands(this.line, known, live ? 0 : now - robot.at, Date.now()));
+    const transitions = this.history.transitions.map((t) => ({ ...t, ago: now - t.at }));
+    const keptFor = (name) => now - (this.history.since.get(name) ?? now);
+    at("bands").replaceChildren(...bands(this.line, transitions, keptFor, live ? 0 : now - robot.at, Date.now()));
   }
 }
 
@@ -102,13 +104,13 @@ function helped(topic, words) {
   return make("a", { href: `help.html#${encodeURIComponent(topic)}` }, words);
 }
 
-function causeLists(line, { causes }) {
+function causeLists(line, causes) {
   const heads = { errors: "Errors", inhibits: line.motion_possible === false ? "Why motion is not possible" : "Why motion may not be possible", unheard: "Why this is unknown" };
   const lists = [];
   for (const [name, head] of Object.entries(heads)) {
     const own = causes.filter((cause) => cause.list === name);
     if (!own.length) continue;
-    const top = make("h2", {}, ...(name === "errors" ? [shape("error")] : []), head);
+    const top = make("h2", {}, ...(name === "errors" ? [shape("fault")] : []), head);
     lists.push(make("section", { class: name }, top, make("ul", {}, ...own.map(causeItem))));
   }
   const blocked = line.vehicle?.modes_blocked;
@@ -154,8 +156,13 @@ function linkTile(robot) {
   return make("div", {}, make("dt", {}, LINK.title), make("dd", {}, chip(look), make("small", { id: "link-age" })));
 }
 
+/** The rule that decided, and below it what would make an unknown field known. */
+function rule(found) {
+  return found.next ? make("div", {}, isolated(found.rule ?? "–"), make("small", {}, found.next)) : isolated(found.rule ?? "–");
+}
+
 function reason(field, found) {
-  const cells = [chip(looks(field, found.value)), isolated(found.rule ?? "–"), isolated(found.source ?? "–"), typeof found.age === "number" ? `${found.age.toFixed(1)} s` : "–"];
+  const cells = [chip(looks(field, found.value)), rule(found), isolated(found.source ?? "–"), typeof found.age === "number" ? `${found.age.toFixed(1)} s` : "–"];
   const head = make("th", { role: "rowheader", scope: "row" }, field.title);
   return make("tr", { role: "row" }, head, ...cells.map((cell, n) => make("td", { role: "cell", "data-head": WHY[n + 1] }, cell)));
 }

@@ -1,6 +1,8 @@
 // The look of each value: a word, a shape and a tone. The gateway makes `fields.js` from its one table of them.
 
-import { LINK as LINK_ROW, SAID, STATES } from "./fields.js";
+import { LINK as LINK_ROW, ROBOT_STATES, SAID, STATES } from "./fields.js";
+
+export { ROBOT_STATES };
 
 const withLooks = (row) => ({ ...row, looks: new Map(row.looks) });
 
@@ -15,13 +17,19 @@ export function looks(field, value) {
 
 /** The headline of a robot while nothing arrives about it, although its last status says otherwise. */
 export function gone(headline, stamp) {
-  const sentences = [{ text: SAID.since, at: stamp }, { text: SAID.may_move }, { text: `${SAID.last}: ${headline.word}` }];
-  return { ...headline, ...SAID.unknown, word: SAID.unknown.word.toUpperCase(), sentences, step: "", causes: [] };
+  const sentences = [{ text: SAID.last, at: stamp, rest: `: ${headline.word}` }, { text: SAID.may_move }];
+  const unknown = ROBOT_STATES.find(({ shape }) => shape === SAID.unknown.shape);
+  return { ...headline, ...unknown, sentences, step: "" };
 }
 
-/** `Last known: AUTO`. */
+/** `Last heard: AUTO`. */
 export function lastKnown(look) {
   return `${SAID.last}: ${look.word}`;
+}
+
+/** When something was, as text: `now`, `14 s ago`. */
+export function ago(seconds) {
+  return seconds !== null && seconds < 2 ? "now" : `${span(seconds)} ago`;
 }
 
 /** `12:03:04` of a stamp or a Date, in the reader's time zone. */
@@ -40,7 +48,7 @@ export function span(seconds) {
 }
 
 /** A sentence of the gateway as plain text. */
-export function plain({ text, at, quote }) {
+export function plain({ text, at, quote, rest }) {
   const parts = [text, at ? clock(at) : "", quote ? `“${quote}”` : ""].filter((part) => part);
-  return parts.join(" ") + (/[.:]$/.test(text) ? "" : ".");
+  return parts.join(" ") + (rest ?? "") + (text.endsWith(".") ? "" : ".");
 }

@@ -1,4 +1,4 @@
-"""The time-dependent cases of docs/semantics/sequences.md. Each docstring starts with the number of its row."""
+"""The time-dependent cases of the rules: each test is a sequence of messages."""
 
 from __future__ import annotations
 
@@ -51,7 +51,6 @@ def px4_flying() -> Flight:
 
 
 def test_fields_keep_their_values_until_the_heartbeat_times_out_and_return_with_it() -> None:
-    """Q01"""
     flight = flying()
     before = flight.status
     assert before.drives_powered is TRUE
@@ -66,7 +65,6 @@ def test_fields_keep_their_values_until_the_heartbeat_times_out_and_return_with_
 
 
 def test_heartbeats_of_a_ground_station_and_a_gimbal_change_nothing_and_do_not_refresh_the_timeout() -> None:
-    """Q02"""
     flight = flying()
     before = flight.status
     flight.stream("gcs", lambda: mav.Heartbeat(0, 6, 8, 0, 4, 3), ids=(255, 190))
@@ -86,7 +84,6 @@ def test_heartbeats_of_a_ground_station_and_a_gimbal_change_nothing_and_do_not_r
 
 
 def test_a_companion_alone_is_not_a_vehicle() -> None:
-    """Q03"""
     flight = Flight(slots=(ExpectedVehicle(1),), streams=False)
     flight.stream("companion", lambda: mav.Heartbeat(0, 18, 8, 128, 4, 3))
     flight.wait(5)
@@ -96,7 +93,6 @@ def test_a_companion_alone_is_not_a_vehicle() -> None:
 
 
 def test_two_vehicles_have_two_handles_and_the_loss_of_one_does_not_change_the_other() -> None:
-    """Q04"""
     flight = flying(slots=())
     flight.stream("second", lambda: mav.Heartbeat(4, 10, 3, 129, 4, 3), ids=(2, 1))
     flight.wait(2)
@@ -112,7 +108,6 @@ def test_two_vehicles_have_two_handles_and_the_loss_of_one_does_not_change_the_o
 
 
 def test_a_reboot_while_armed_drops_the_latches_raises_5004_and_requests_messages_again() -> None:
-    """Q05"""
     flight = rover().hb(armed=True, state=ACTIVE)
     flight.reboot(uptime_s=800).stream("system_time", flight.system_time)
     flight.text("Crash: Going to HOLD", 0)
@@ -134,7 +129,6 @@ def test_a_reboot_while_armed_drops_the_latches_raises_5004_and_requests_message
 
 
 def test_a_crash_stays_until_the_next_arming() -> None:
-    """Q06"""
     flight = flying().text(CRASH, 0)
     assert flight.code == 4001
     flight.hb(armed=False, state=STANDBY)
@@ -144,7 +138,6 @@ def test_a_crash_stays_until_the_next_arming() -> None:
 
 
 def test_a_cleared_text_ends_a_failsafe() -> None:
-    """Q07"""
     flight = copter()
     flight.wait(12)
     flight.hb(armed=True, state=CRITICAL).text("Radio Failsafe")
@@ -155,7 +148,6 @@ def test_a_cleared_text_ends_a_failsafe() -> None:
 
 
 def test_a_failsafe_without_a_cleared_text_ends_two_seconds_after_state_critical() -> None:
-    """Q08"""
     flight = flying().text("Radio Failsafe")
     assert {status.error_code for status in flight.wait(1)} == {2001}
     flight.hb(state=CRITICAL)
@@ -167,7 +159,6 @@ def test_a_failsafe_without_a_cleared_text_ends_two_seconds_after_state_critical
 
 
 def test_state_critical_alone_is_2000_until_a_text_names_the_failsafe() -> None:
-    """Q09"""
     flight = flying().hb(state=CRITICAL)
     flight.wait(3)
     assert flight.codes == [2000]
@@ -176,7 +167,6 @@ def test_state_critical_alone_is_2000_until_a_text_names_the_failsafe() -> None:
 
 
 def test_a_text_without_its_second_chunk_is_classified_by_its_start_after_two_seconds() -> None:
-    """Q10"""
     flight = flying().chunk(7, 0, CRASH.ljust(50, "."), 0)
     assert {status.error_code for status in flight.wait(1.99)} == {0}
     flight.wait(0.1)
@@ -184,7 +174,6 @@ def test_a_text_without_its_second_chunk_is_classified_by_its_start_after_two_se
 
 
 def test_a_chunk_without_the_start_of_its_text_is_dropped() -> None:
-    """Q11"""
     flight = flying().chunk(7, 1, CRASH, 0)
     assert {status.error_code for status in flight.wait(5)} == {0}
     assert flight.vehicle.state is not None
@@ -192,14 +181,12 @@ def test_a_chunk_without_the_start_of_its_text_is_dropped() -> None:
 
 
 def test_a_tab_at_the_end_of_a_px4_text_is_ignored() -> None:
-    """Q12"""
     flight = px4_flying().chunk(4, 0, "Failsafe activated\t", 2).hb(state=CRITICAL)
     assert [(error.code, error.text) for error in flight.detail.errors] == [(2000, "Failsafe activated")]
 
 
 @pytest.mark.parametrize(("assume", "expected"), [(False, UNKNOWN), (True, FALSE)])
 def test_arming_makes_a_released_stop_unknown_unless_an_option_says_otherwise(assume: bool, expected: TriState) -> None:
-    """Q13"""
     flight = copter(options=HardwareOptions(estop_assume_visible=assume))
     flight.wait(5)
     assert flight.status.e_stopped is FALSE
@@ -209,7 +196,6 @@ def test_arming_makes_a_released_stop_unknown_unless_an_option_says_otherwise(as
 
 @pytest.mark.parametrize("assume", [False, True])
 def test_a_stop_by_rc_switch_blocks_the_drives_and_is_not_an_error(assume: bool) -> None:
-    """Q14"""
     flight = flying(options=HardwareOptions(estop_assume_visible=assume))
     flight.text("RC7: MotorEStop HIGH", 6)
     stopped = flight.status
@@ -222,7 +208,6 @@ def test_a_stop_by_rc_switch_blocks_the_drives_and_is_not_an_error(assume: bool)
 
 
 def test_a_bit_is_an_error_after_two_faulty_messages_and_not_after_one() -> None:
-    """Q15"""
     flight = flying()
     flight.set(health=flight.health & ~GYRO)
     seen = flight.wait(1)
@@ -238,7 +223,6 @@ def test_a_bit_is_an_error_after_two_faulty_messages_and_not_after_one() -> None
 
 
 def test_in_error_is_unknown_without_sys_status() -> None:
-    """Q16"""
     flight = copter()
     flight.wait(15)
     assert (flight.status.in_error, flight.status.e_stopped) == (FALSE, FALSE)
@@ -252,7 +236,6 @@ def test_in_error_is_unknown_without_sys_status() -> None:
 
 
 def test_the_speed_of_a_rover_is_judged_with_hysteresis() -> None:
-    """Q17"""
     flight = rover().hb(armed=True, state=ACTIVE)
     speed = 0.0
     flight.stream("position", lambda: mav.LocalPositionNed(flight.boot_ms, speed, 0, 0), hz=10)
@@ -280,7 +263,6 @@ def test_the_speed_of_a_rover_is_judged_with_hysteresis() -> None:
 
 
 def test_a_leak_lasts_45_seconds_after_its_last_text() -> None:
-    """Q18"""
     flight = Flight(vehicle_type=SUB)
     flight.wait(12)
     for _ in range(4):
@@ -292,7 +274,6 @@ def test_a_leak_lasts_45_seconds_after_its_last_text() -> None:
 
 
 def test_a_px4_event_counts_while_armed_unless_it_answers_an_operator() -> None:
-    """Q19"""
     flight = px4_flying().event(0x42)
     assert {status.error_code for status in flight.wait(9.9)} == {7002}
     flight.wait(0.2)
@@ -303,12 +284,10 @@ def test_a_px4_event_counts_while_armed_unless_it_answers_an_operator() -> None:
 
 
 def test_an_event_with_the_protocol_log_level_is_ignored() -> None:
-    """Q20"""
     assert px4_flying().event(0x88).codes == []
 
 
 def test_an_unknown_text_of_high_severity_counts_for_ten_seconds_while_armed() -> None:
-    """Q21"""
     flight = flying()
     assert flight.text("Something bad", 3).code == 0
     assert flight.text("Something bad", 2).code == 6002
@@ -320,7 +299,6 @@ def test_an_unknown_text_of_high_severity_counts_for_ten_seconds_while_armed() -
 
 
 def test_a_cleared_glitch_is_not_an_error_at_any_severity() -> None:
-    """Q22"""
     flight = flying()
     assert flight.text("GPS Glitch cleared", 2).code == 0
     assert flight.text("GPS Glitch or Compass error", 2).code == 2008
@@ -328,7 +306,6 @@ def test_a_cleared_glitch_is_not_an_error_at_any_severity() -> None:
 
 
 def test_failing_arming_checks_are_readiness_and_never_an_error() -> None:
-    """Q23"""
     flight = copter().set(health=FITTED)
     for _ in range(20):
         flight.text("PreArm: Compass not calibrated", 2)
@@ -338,7 +315,6 @@ def test_failing_arming_checks_are_readiness_and_never_an_error() -> None:
 
 
 def test_our_own_texts_are_not_attributed_to_the_autopilot() -> None:
-    """Q24"""
     flight = flying()
     before = flight.status
     flight.text("RS: MANUAL, stopped", 2, ids=(1, 192))
@@ -346,7 +322,6 @@ def test_our_own_texts_are_not_attributed_to_the_autopilot() -> None:
 
 
 def test_a_battery_fault_just_after_boot_is_not_an_error() -> None:
-    """Q25"""
     flight = copter().reboot().set(health=FITTED & ~BATTERY | PREARM)
     flight.stream("system_time", flight.system_time)
     seen = flight.wait(5)
@@ -359,7 +334,6 @@ def test_a_battery_fault_just_after_boot_is_not_an_error() -> None:
 
 
 def test_a_stop_in_flight_is_never_false_after_disarming_even_if_the_arming_check_is_still_healthy() -> None:
-    """Q26"""
     flight = flying().stop("sys_status")
     flight.hb(armed=False, state=STANDBY)
     seen = flight.wait(0.5)
@@ -394,7 +368,6 @@ class Outputs:
 
 
 def test_outputs_at_their_stop_value_under_full_throttle_show_the_stop_of_a_copter() -> None:
-    """Q27"""
     flight = copter()
     outputs = Outputs(flight, [1000] * 4)
     flight.wait(15)
@@ -417,7 +390,6 @@ def test_outputs_at_their_stop_value_under_full_throttle_show_the_stop_of_a_copt
 
 
 def test_the_throttle_channel_shows_the_stop_of_a_rover_and_its_end() -> None:
-    """Q28"""
     flight = rover()
     outputs = Outputs(flight, [1500, 0, 1500])
     flight.stream("attitude", lambda: mav.Attitude(flight.boot_ms, 0.0, 0.0, 0.0), hz=2)
@@ -468,7 +440,6 @@ def test_a_rover_that_comes_to_rest_while_vfr_hud_is_lost_is_not_stopped() -> No
 
 
 def test_a_px4_that_becomes_not_ready_has_not_rebooted() -> None:
-    """Q29"""
     flight = px4()
     flight.wait(15)
     assert "PREARM_FAILING" not in flight.inhibits
@@ -483,7 +454,6 @@ def test_a_px4_that_becomes_not_ready_has_not_rebooted() -> None:
 
 
 def test_a_px4_failsafe_is_an_error_exactly_while_the_state_shows_it() -> None:
-    """Q30"""
     flight = px4_flying().chunk(1, 0, "Failsafe activated: entering Hold for 5 seconds\t", 2)
     flight.hb(state=CRITICAL)
     seen = flight.wait(5)
@@ -495,7 +465,6 @@ def test_a_px4_failsafe_is_an_error_exactly_while_the_state_shows_it() -> None:
 
 
 def test_a_refusal_in_two_chunks_is_one_text_and_not_an_error() -> None:
-    """Q31"""
     flight = px4().set(health=FITTED)
     flight.wait(15)
     flight.chunk(9, 0, "Arming denied: Resolve system health failures firs", 2).chunk(9, 1, "t\t", 2)
@@ -509,7 +478,6 @@ def test_a_refusal_in_two_chunks_is_one_text_and_not_an_error() -> None:
     ids=["rover", "copter 4.7", "copter 4.5"],
 )
 def test_a_reboot_while_disarmed_is_detected_and_is_not_an_error(vehicle: Any, state: int, mode: int) -> None:
-    """Q32"""
     flight = vehicle()
     flight.stream("system_time", flight.system_time)
     flight.text("WDG: T3 SL0 FL0", 2)
@@ -531,7 +499,6 @@ def test_a_reboot_while_disarmed_is_detected_and_is_not_an_error(vehicle: Any, s
 
 
 def test_internal_errors_last_until_the_reboot() -> None:
-    """Q33"""
     flight = flying()
     flight.stream("system_time", flight.system_time)
     flight.set(internal_errors=0x400)
@@ -545,7 +512,6 @@ def test_internal_errors_last_until_the_reboot() -> None:
 
 
 def test_a_battery_failsafe_does_not_make_a_critical_battery_low_again() -> None:
-    """Q34"""
     flight = flying().hb(state=CRITICAL)
     flight.text("Battery 1 is low 10.50V used 1500 mAh").text("Battery Failsafe")
     assert flight.codes == [2003]
@@ -557,7 +523,6 @@ def test_a_battery_failsafe_does_not_make_a_critical_battery_low_again() -> None
 
 
 def test_an_inav_that_reports_itself_as_ardupilot_is_recognised_by_its_first_sys_status() -> None:
-    """Q35"""
     flight = rover(streams=False).hb(mode=4, armed=True, state=ACTIVE)
     assert (flight.status.mode, flight.detail.vehicle.flight_mode) == (RobotMode.AUTO, "HOLD")
     flight.set(present=0x0101000F, enabled=0x0101000F, health=0x0101000F)

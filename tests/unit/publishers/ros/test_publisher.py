@@ -10,6 +10,7 @@ import pytest
 
 from mav_robot_status.clock import Instant, later
 from mav_robot_status.errors import UsageError
+from mav_robot_status.extras import install
 from mav_robot_status.interface import PublisherContext, RobotStatusMsg
 from mav_robot_status.publishers.ros import publisher as module
 from mav_robot_status.publishers.ros.publisher import Ros2Publisher
@@ -127,7 +128,7 @@ def test_a_missing_extra_is_one_line_that_says_what_to_install(
             monkeypatch.delitem(sys.modules, name)
     with pytest.raises(UsageError) as raised:
         made(url=url)
-    assert str(raised.value) == f"ros2: this output needs an extra: pip install 'mav-robot-status[{extra}]'"
+    assert str(raised.value) == f"ros2: this output needs an extra: {install(extra)}"
 
 
 def test_without_ros2_none_of_its_libraries_is_imported() -> None:

@@ -3,11 +3,12 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Iterator
+from datetime import datetime
 from typing import Any
 
 import pytest
 
-from mav_robot_status.interface import RobotMode, RobotStatus
+from mav_robot_status.interface import Detail, RobotMode, RobotStatus, TriState
 from mav_robot_status.publishers.board import Board
 from mav_robot_status.publishers.web import events
 from mav_robot_status.publishers.web.events import Events, Listener
@@ -81,9 +82,9 @@ def test_each_line_comes_with_its_headline_and_none_is_made_while_nobody_listens
 ) -> None:
     made: list[str] = []
 
-    def said(line: dict[str, Any], last: object) -> dict[str, Any]:
+    def said(line: dict[str, Any], last: object, members: object) -> dict[str, Any]:
         made.append(line["handle"])
-        return {"word": "CAN MOVE"}
+        return {"word": "PARKED"}
 
     monkeypatch.setattr(events, "said", said)
     stage.take(MANUAL, "a")
@@ -92,7 +93,7 @@ def test_each_line_comes_with_its_headline_and_none_is_made_while_nobody_listens
     assert made == []
     for _ in range(2):
         [(_, data)] = stage.received(stage.listener())
-        assert data["headlines"] == {"a": {"word": "CAN MOVE"}, "b": {"word": "CAN MOVE"}}
+        assert data["headlines"] == {"a": {"word": "PARKED"}, "b": {"word": "PARKED"}}
     assert made == ["a", "b"]  # once for all listeners
 
 
@@ -142,13 +143,51 @@ def test_a_listener_of_a_vehicle_gets_its_history_and_then_new_transitions(stage
     stage.clock.advance(5)
     listener = stage.listener("robot")
     data = dict(stage.received(listener))["history"]
-    assert (data["whole"], data["known_for"]) == (True, 5.0)
+    now, (since,) = (datetime.fromisoformat(data["now"][:-1]), set(data["kept_since"].values()))
+    assert data["whole"]
+    assert (now - datetime.fromisoformat(since[:-1])).total_seconds() == 5.0
     assert {"ago": 5.0, "name": "mode", "value": "MANUAL", "before": None}.items() <= data["transitions"][0].items()
     stage.clock.advance(1)
     stage.take(AUTO)
     data = dict(stage.received(listener))["history"]
     assert (data["whole"], [(t["name"], t["before"]) for t in data["transitions"]]) == (False, [("mode", "MANUAL")])
     assert "history" not in dict(stage.received(listener))
+
+
+def test_the_causes_of_a_shown_vehicle_are_sent_when_it_changes(stage: Stage) -> None:
+    stage.take(MANUAL)
+    listener = stage.listener("robot")
+    assert dict(stage.received(listener))["about"] == {"handle": "robot", "causes": [], "last": None}
+    assert stage.received(listener) == []
+    stage.take(AUTO)
+    assert "about" in dict(stage.received(listener))
+
+
+def test_events_and_what_waits_for_a_person_are_sent_once_and_to_everybody(stage: Stage) -> None:
+    first = stage.listener()
+    stage.received(first)
+    stage.take(MANUAL._replace(e_stopped=TriState.TRUE))
+    data = dict(stage.received(first))["change"]
+    assert [(one["word"], one["what"]) for one in data["events"]] == [("EMERGENCY STOP", "begins")]
+    assert len(data["pending"]) == 1
+    stage.board.acknowledge(None, stage.clock.now())
+    second = stage.listener()
+    for listener in (first, second):
+        data = next(data for _, data in stage.received(listener))
+        assert (data["pending"], data["events"][-1]["what"]) == ([], "acknowledged")
+    assert stage.received(first) == []
+
+
+def test_a_group_is_told_anew_when_a_member_changes(stage: Stage) -> None:
+    detail = Detail(1, 192, members=("base",))
+    stage.board.update(msg(MANUAL, detail, "group"), 0.0)
+    stage.take(MANUAL, "base")
+    listener = stage.listener()
+    stage.received(listener)
+    stage.take(MANUAL._replace(e_stopped=TriState.TRUE), "base")
+    data = dict(stage.received(listener))["change"]
+    assert [line["handle"] for line in data["vehicles"]] == ["base"]
+    assert data["headlines"]["group"]["sentences"][0]["text"] == "base is stopped"
 
 
 def test_an_unknown_vehicle_has_no_history(stage: Stage) -> None:

@@ -5,8 +5,8 @@ import re
 from importlib.resources import files
 
 from mav_robot_status.interface import STATES
-from mav_robot_status.language import LINK, LOOKS, TONES, style_sheet
-from mav_robot_status.language.headline import ROWS
+from mav_robot_status.language import LINK, LOOKS, ROBOT_STATES, TONES, style_sheet
+from mav_robot_status.language.shapes import SHAPES
 from mav_robot_status.publishers.web.looks import fields_module
 
 ASSETS = files("mav_robot_status.publishers.web") / "assets"
@@ -27,11 +27,14 @@ def test_the_browser_gets_every_look_of_every_field() -> None:
 
 
 def test_every_shape_has_a_drawing() -> None:
-    drawn = set(re.findall(r'<symbol id="(\w+)"', (ASSETS / "index.html").read_text("utf-8")))
-    shapes = {look.shape for looks in LOOKS.values() for look in looks.values()} | {
-        row.look.shape for row in ROWS.values()
-    }
-    assert shapes <= drawn
+    shapes = {look.shape for looks in LOOKS.values() for look in looks.values()}
+    assert shapes | {state.shape for state in ROBOT_STATES} == set(SHAPES)
+    assert "{{shapes}}" in (ASSETS / "index.html").read_text("utf-8")
+
+
+def test_the_browser_gets_every_state_of_a_robot() -> None:
+    states = constants()["ROBOT_STATES"]
+    assert [one["word"] for one in states] == [state.word for state in ROBOT_STATES]  # type: ignore[attr-defined]
 
 
 def test_the_sheet_has_both_colours_of_every_tone() -> None:
@@ -44,9 +47,10 @@ def test_the_sheet_has_both_colours_of_every_tone() -> None:
 def test_the_page_has_no_colours_or_words_of_its_own() -> None:
     tones = {colour.lower() for tone in TONES.values() for colour in (tone.light, tone.dark)}
     words = {look.word for looks in LOOKS.values() for look in looks.values() if look.word.isupper()}
+    words |= {state.word for state in ROBOT_STATES}
     for file in ASSETS.iterdir():
         text = file.read_text("utf-8")
         assert not tones & set(re.findall(r"#[0-9a-f]{6}", text.lower())), file.name
         if file.name.endswith(".js"):
             quoted = set(re.findall(r"\"([A-Z][A-Z ]+)\"", text))
-            assert quoted & words <= {"LOST"}, file.name  # the state of a link
+            assert quoted & words <= {"LOST", "UNKNOWN"}, file.name  # a state of a link, a mode

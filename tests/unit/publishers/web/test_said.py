@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_robot_status.publishers.web.said import MOST_CAUSES, MOST_SENTENCES, said, with_words
+from mav_robot_status.publishers.web.said import MOST_CAUSES, MOST_SENTENCES, about, said, with_words
 
 STAMP = "2026-11-20T14:03:20.000000Z"
 HEARD: dict[str, Any] = {
@@ -27,15 +27,15 @@ JSON = st.recursive(
 
 
 def test_a_cause_has_its_words_and_keeps_its_name() -> None:
-    error, inhibit = said(HEARD, None)["causes"]
+    error, inhibit = about(HEARD, None)["causes"]
     assert (error["list"], error["code"], bool(error["words"])) == ("errors", 2001, True)
     assert (error["name"], error["text"]) == ("RADIO_FAILSAFE", "Radio Failsafe")
-    assert (inhibit["list"], inhibit["words"], inhibit["name"]) == ("inhibits", "disarmed", "DISARMED")
-    assert said(HEARD, None)["last"] is None
+    assert (inhibit["list"], inhibit["words"], inhibit["name"]) == ("inhibits", "it is disarmed", "DISARMED")
+    assert about(HEARD, None)["last"] is None
 
 
 def test_a_lost_link_is_no_reason_why_motion_is_impossible() -> None:
-    found = said(LOST, HEARD)
+    found = about(LOST, HEARD)
     assert [cause["list"] for cause in found["causes"]] == ["unheard"]
     assert found["last"]["mode"] == "AUTO"
     assert found["last"]["in_motion"] is True
@@ -43,13 +43,18 @@ def test_a_lost_link_is_no_reason_why_motion_is_impossible() -> None:
 
 def test_what_is_said_is_bounded() -> None:
     many = [{"name": f"E{n}", "text": "x", "since": STAMP} for n in range(5000)]
-    found = said({**HEARD, "errors": many}, None)
-    assert (len(found["causes"]), len(found["sentences"])) == (MOST_CAUSES, MOST_SENTENCES)
+    line = {**HEARD, "errors": many}
+    assert len(about(line, None)["causes"]) == MOST_CAUSES
+    assert len(said(line, None, {})["sentences"]) == MOST_SENTENCES
 
 
 def test_only_a_cause_gets_words() -> None:
     assert with_words("AUTO") == "AUTO"
-    assert with_words({"name": "DISARMED", "begins": True}) == {"name": "DISARMED", "begins": True, "words": "disarmed"}
+    assert with_words({"name": "DISARMED", "begins": True}) == {
+        "name": "DISARMED",
+        "begins": True,
+        "words": "it is disarmed",
+    }
 
 
 @given(
@@ -57,5 +62,5 @@ def test_only_a_cause_gets_words() -> None:
     st.none() | st.dictionaries(st.sampled_from(sorted(HEARD)), JSON),
 )
 def test_any_line_of_another_process_has_words(line: dict[str, Any], last: dict[str, Any] | None) -> None:
-    assert json.dumps(said({**HEARD, **line}, last))
-    assert json.dumps(said({**LOST, **line}, last))
+    for whole in ({**HEARD, **line}, {**LOST, **line}, {**HEARD, "members": ["a"], **line}):
+        assert json.dumps([said(whole, last, {"a": line}), about(whole, last)])

@@ -11,7 +11,7 @@ import pytest
 
 from mav_robot_status.clock import Instant
 from mav_robot_status.clock import now as present
-from mav_robot_status.interface import Detail, RobotMode, RobotStatus
+from mav_robot_status.interface import Detail, RobotMode, RobotStatus, TriState
 from mav_robot_status.publishers.board import Board
 from mav_robot_status.publishers.web import events
 from mav_robot_status.publishers.web.serve import GENERATED, STANDING, serve
@@ -115,8 +115,8 @@ def test_a_change_is_sent_as_an_event() -> None:
         head = listening.head()
         assert "200 OK" in head
         assert "Content-Type: text/event-stream" in head
-        names = [name for name, _ in islice(listening.events(), 2)]
-        assert names == ["board", "history"]
+        names = [name for name, _ in islice(listening.events(), 3)]
+        assert names == ["board", "about", "history"]
         start = time.monotonic()
         site.take(msg(AUTO))
         data = next(data for name, data in listening.events() if name == "change" and data["vehicles"])
@@ -124,6 +124,26 @@ def test_a_change_is_sent_as_an_event() -> None:
         assert in_time(time.monotonic() - start, 1.0)
         listening.close()
         until(lambda: not site.server._events.listeners)
+
+
+def test_an_acknowledgement_is_kept_and_no_other_site_can_send_one() -> None:
+    with Site(token="correct-horse-battery") as site:
+        site.take(msg(MANUAL._replace(e_stopped=TriState.TRUE)))
+        ours = {"X_Requested_With": "page", "Authorization": "Bearer correct-horse-battery"}
+        path = "/api/v1/acknowledge?handle=robot"
+        assert site.ask(path, "POST", X_Requested_With="page").status == 401
+        assert site.ask(path, "POST", Authorization=ours["Authorization"]).status == 403
+        assert site.ask(path, "GET", **ours).status == 405
+        assert site.ask("/api/v1/vehicles", "POST", **ours).status == 405
+        assert len(site.server.board.alarms.pending) == 1
+        assert site.ask(path, "POST", **ours).status == 204
+        assert not site.server.board.alarms.pending
+
+
+def test_the_wall_is_the_same_page() -> None:
+    with Site() as site:
+        assert site.ask("/wall").body == site.ask("/").body
+        assert b'<symbol id="stop"' in site.ask("/").body
 
 
 def test_the_head_of_the_stream_has_an_end() -> None:

@@ -252,7 +252,14 @@ def test_a_late_failsafe_counts_while_its_state_lasts() -> None:
 def test_events_of_other_autopilots_have_no_meaning() -> None:
     flight = copter().set(health=FITTED & ~PREARM)
     flight.wait(12)
-    assert send(flight, report(1)).detail.vehicle.can_arm is None
+    assert send(flight, report(1)).detail.vehicle.can_arm is False  # what SYS_STATUS says
+
+
+def test_an_autopilot_without_reports_says_in_sys_status_whether_its_checks_pass() -> None:
+    for armed, told in ((False, True), (True, None)):
+        flight = copter().set(health=FITTED | PREARM, armed=armed)
+        flight.wait(12)
+        assert flight.detail.vehicle.can_arm is told
 
 
 def asked_for(flight: Flight) -> list[tuple[int, int]]:

@@ -1,0 +1,1 @@
+"""Statuses in MCAP files: `settings` has the options, `file` writes one file, `publisher` decides which."""

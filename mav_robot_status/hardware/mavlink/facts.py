@@ -79,6 +79,15 @@ class Outputs(NamedTuple):
     """Whether they stand at their stop value while throttle is demanded, without a proof that they are motors."""
 
 
+class MotorTest(NamedTuple):
+    """Whether a motor turns although the vehicle is disarmed."""
+
+    turns: bool
+    """Whether the outputs show it, now or a moment ago."""
+    may_turn: bool
+    """Whether an output, a text, a command or rpm is evidence of it."""
+
+
 class Stop(NamedTuple):
     """What the autopilot has reported about an emergency stop."""
 
@@ -223,6 +232,7 @@ class Facts(NamedTuple):
     lies: bool
     """Whether a multicopter has not moved since it lay on the ground for certain."""
     outputs: Outputs
+    motor_test: MotorTest
     outputs_vetoed: bool
     """Whether a motion shows that the vehicle is driven although the outputs seem held."""
     esc_turning: bool

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from ...interface.status import RobotMode, TriState
 from ...mavlink.enumerations import MAV_STATE_FLIGHT_TERMINATION, MAV_STATE_UNINIT
 from .armed import NOT_MOVING_STATES
+from .estop.rule import motor_test_words
 from .heartbeat.rule import (
     actuators_blocked,
     base_mode_words,
@@ -15,7 +16,7 @@ from .heartbeat.rule import (
     is_initialising,
     state_words,
 )
-from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason
+from .reason import FALSE, TRUE, UNKNOWN, Finding, Reason, off
 
 if TYPE_CHECKING:
     from .autopilots.modes import FlightMode
@@ -28,6 +29,10 @@ def drives_powered(facts: Facts, options: HardwareOptions, stopped: TriState, wh
     if not facts.armed:
         if hides_armed(facts):
             return UNKNOWN, Reason("a state in which the autopilot does not say whether it is armed", state_words)
+        if facts.motor_test.turns:
+            return TRUE, Reason("a motor turns while it is disarmed (motor test)", motor_test_words)
+        if facts.motor_test.may_turn:
+            return UNKNOWN, Reason("a motor may turn while it is disarmed (motor test)", motor_test_words)
         if facts.fresh.arming_told and stopped is not TRUE:
             return UNKNOWN, Reason("an arming was announced, and no HEARTBEAT has arrived since", base_mode_words)
         return FALSE, Reason("disarmed", base_mode_words)
@@ -49,7 +54,7 @@ def motion_possible(
     state = facts.heartbeat.system_status
     if drives is FALSE:
         return FALSE, why_drives._replace(rule=off(why_drives.rule))
-    if hides_armed(facts) or (drives is UNKNOWN and not facts.armed):
+    if not facts.armed:  # powered or not: a motor test takes no motion command
         return UNKNOWN, why_drives
     if state in NOT_MOVING_STATES:
         return FALSE, Reason("a state in which the vehicle does not move", state_words)
@@ -62,8 +67,3 @@ def motion_possible(
     if state == MAV_STATE_UNINIT:
         return UNKNOWN, Reason("state UNINIT", state_words)
     return TRUE, Reason("armed, not stopped, in a state that moves", state_words)
-
-
-def off(rule: str) -> str:
-    """Why motion is not possible, from the reason why its drives have no power."""
-    return f"Drives are off: {'it is disarmed' if rule == 'disarmed' else rule}"

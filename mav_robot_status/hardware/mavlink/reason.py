@@ -85,3 +85,8 @@ class EvidenceOfVehicle(Mapping[str, Evidence]):
 
     def __len__(self) -> int:
         return len(self._reasons)
+
+
+def off(rule: str) -> str:
+    """Why motion is not possible, from the reason why its drives have no power."""
+    return f"Drives are off: {'it is disarmed' if rule == 'disarmed' else rule}"

@@ -18,6 +18,7 @@ from ...mavlink.enumerations import MAV_VTOL_STATE_MC, MAV_VTOL_STATE_UNDEFINED
 from .autopilots import announced_as
 from .estop import outputs, pending_command
 from .estop import state as estop
+from .estop.motor_test import MotorTest
 from .faults import latches, parts, sensors, text_assembly
 from .heartbeat.state import HeartbeatHistory, first_heartbeat
 from .identity import FIXED_PITCH, Family, family_of, sensor_name
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from .autopilots import Autopilot
     from .autopilots.firmware import Firmware
     from .autopilots.modes import AvailableMode
+    from .autopilots.profile import Version
     from .autopilots.sensor_weights import Weight
     from .estop.applet import Applet
     from .options import HardwareOptions
@@ -106,6 +108,8 @@ class VehicleState:
     rotation: Motion = field(default_factory=Motion)
     """The motion according to rotation alone. Its FALSE means nothing."""
     watch: outputs.Watch = field(default_factory=outputs.Watch)
+    test: MotorTest = field(default_factory=MotorTest)
+    """The evidence that a motor turns while disarmed."""
     switches: Mapping[int, int] = field(default_factory=dict)
     """RCn_OPTION by channel, as far as received."""
     texts: text_assembly.TextAssembly = text_assembly.EMPTY
@@ -165,10 +169,13 @@ class VehicleState:
 
     def counting_faults(self, options: HardwareOptions) -> list[tuple[int, Weight, sensors.Fault]]:
         """The faults in SYS_STATUS that have a meaning for this vehicle, at this site."""
-        firmware = self.version
+        check, status = self.profile.stops.check, self.latest.sys_status
+        least: Version | None = self.version
+        if least is None and check is not None and status is not None and sensors.has_prearm_check(status.message):
+            least = check.prearm_check
         return [
             found
-            for found in sensors.counting(self.faults, self.profile, firmware, self.heartbeats.armed)
+            for found in sensors.counting(self.faults, self.profile, least, self.heartbeats.armed)
             if sensor_name(found[0]) not in options.ignore_sensors
         ]
 

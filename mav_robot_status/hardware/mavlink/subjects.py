@@ -113,6 +113,7 @@ FACTS: Final[dict[str, Fact]] = {
     "has_no_lift": motion.has_no_lift,
     "lies": motion.lies,
     "outputs": estop.motor_outputs,
+    "motor_test": estop.motor_test,
     "outputs_vetoed": estop.outputs_vetoed,
     "esc_turning": estop.esc_turning,
     "stop": estop.stop,

@@ -188,7 +188,7 @@ PX4: Final = Autopilot(
         reports_estimator=False,
     ),
     requests=Requests(
-        wanted=wanted.COMMON + wanted.CURRENT_MODE,
+        wanted=wanted.COMMON + wanted.CURRENT_MODE + wanted.OUTPUTS,
         watched_families=frozenset(),
         once=(wanted.VERSION, wanted.MODES, wanted.METADATA),
         prearm_checks=True,

@@ -52,10 +52,9 @@ COMMON: Final = (
     wanted(mavlink.MAVLINK_MSG_ID_ATTITUDE, 4.0),
     wanted(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, 1.0),
 )
-OUTPUT_WATCH: Final = (
-    wanted(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2.0),
-    wanted(mavlink.MAVLINK_MSG_ID_VFR_HUD, 2.0),
-)
+OUTPUTS: Final = (wanted(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2.0),)
+"""They show a motor that turns, also while the vehicle is disarmed."""
+OUTPUT_WATCH: Final = (*OUTPUTS, wanted(mavlink.MAVLINK_MSG_ID_VFR_HUD, 2.0))
 """The additional messages for the output watch."""
 ESTIMATOR: Final = (wanted(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 0.5),)
 """It is valid for ten seconds."""

@@ -16,7 +16,7 @@ NAME: Final = b"RS_STOP"
 EMERGENCY_STOP, SAFETY_SWITCH = 1, 2
 VALUES: Final = frozenset({0, EMERGENCY_STOP, SAFETY_SWITCH, EMERGENCY_STOP | SAFETY_SWITCH})
 FRESH: Final = 3.0  # s
-CONTRADICTED: Final = 1.0
+CONTRADICTED: Final = 0.5
 """Seconds for which a motor may be driven after the applet has reported a stop: messages cross."""
 
 

@@ -10,13 +10,20 @@ from typing import TYPE_CHECKING, Any, Final
 from ....interface.status import TriState
 from ....mavlink import definitions as mav
 from ....mavlink.definitions import CommandAck, CommandInt, CommandLong
-from ....mavlink.enumerations import MAV_CMD_COMPONENT_ARM_DISARM, MAV_CMD_DO_FLIGHTTERMINATION, MAV_RESULT_ACCEPTED
+from ....mavlink.enumerations import (
+    MAV_CMD_COMPONENT_ARM_DISARM,
+    MAV_CMD_DO_FLIGHTTERMINATION,
+    MAV_RESULT_ACCEPTED,
+    MAV_STATE_FLIGHT_TERMINATION,
+    MAV_TYPE_FIXED_WING,
+)
 from ..faults import latches
 from ..faults.causes import TERMINATION_ANNOUNCED
+from ..faults.sensors import safety_switch_on
 from ..motion.estimate import hud_speeds
 from ..state import FRESH, heard, honours_stop, is_fresh, vtol_state
 from . import applet as applet_rules
-from . import outputs, pending_command
+from . import motor_test, outputs, pending_command
 from . import state as estop
 
 if TYPE_CHECKING:
@@ -36,7 +43,11 @@ _NUMBERED: Final = re.compile(rb"SERVO(\d{1,2})_FUNCTION|RC(\d{1,2})_OPTION")
 
 def servo_output_raw(state: VehicleState, message: mav.ServoOutputRaw, now: Instant, options: HardwareOptions) -> None:
     """SERVO_OUTPUT_RAW: the output watch of ArduPilot. A driven motor ends every evidence of a stop."""
-    if not state.profile.stops.outputs_show or not options.watch_outputs or message.port != 0:
+    if not options.watch_outputs or message.port != 0:
+        return
+    if not state.heartbeats.armed:
+        _heard_disarmed(state, message[:8] + message[9:], now.mono)
+    if not state.profile.stops.outputs_show:
         return
     hud, at, watch = state.latest.vfr_hud, now.mono, state.watch
     family, vehicle_type = state.family, state.vehicle_type
@@ -62,6 +73,27 @@ def servo_output_raw(state: VehicleState, message: mav.ServoOutputRaw, now: Inst
             state.stop = estop.doubted(before, estop.HELD, at)
         elif off is not None and at >= off + outputs.SWITCHED_OFF:
             state.stop = estop.doubted(before, estop.SHUT_DOWN, at)
+
+
+def _heard_disarmed(state: VehicleState, values: outputs.Outputs, now: float) -> None:
+    """The outputs of a disarmed vehicle: a motor test drives them."""
+    status = state.latest.sys_status
+    held = status is not None and state.profile.sensors.has_safety_switch and safety_switch_on(status.message)
+    if held or now < state.heartbeats.edge.mono + motor_test.AFTER_DISARM:
+        return
+    if state.profile.stops.outputs_show:
+        motors, assumed = outputs.channels(state.watch, state.vehicle_type)
+        if assumed and state.vehicle_type == MAV_TYPE_FIXED_WING:
+            motors += outputs.LIFT
+    else:  # of a PX4 any output may be a motor: those count that stand at a stop value of a motor
+        state.watch.at, state.watch.values = now, values
+        low, high = outputs.LOW_END
+        known = state.test.stop
+        motors = tuple(c for c, value in enumerate(values, 1) if c in known or low <= value <= high)
+        assumed = False
+        if state.heartbeats.state == MAV_STATE_FLIGHT_TERMINATION and state.test.until < now:
+            return  # its outputs stand at their failsafe values
+    motor_test.heard_outputs(state.test, values, motors, assumed, state.family, now)
 
 
 def param_value(state: VehicleState, message: mav.ParamValue, now: Instant, options: HardwareOptions) -> None:
@@ -186,8 +218,15 @@ def command_ack(state: VehicleState, message: CommandAck, now: Instant, options:
         if message.result == MAV_RESULT_ACCEPTED and (asked is None or asked.param1 != 0):
             state.told_armed = max(state.told_armed, now.mono)
         return
-    if asked is None:
-        return
+    if message.command in motor_test.COMMANDS:
+        if message.result == MAV_RESULT_ACCEPTED:
+            motor_test.accepted(state.test, message.command, 0.0 if asked is None else asked.lasts, now.mono)
+    elif asked is not None:
+        _apply(state, asked, message, now)
+
+
+def _apply(state: VehicleState, asked: pending_command.PendingCommand, message: CommandAck, now: Instant) -> None:
+    """Apply a command that concerns a stop, if the vehicle accepted it."""
     if message.result != MAV_RESULT_ACCEPTED:
         if state.stop is asked.after:
             state.stop = asked.before

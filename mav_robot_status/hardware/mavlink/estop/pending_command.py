@@ -9,20 +9,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from ....mavlink.definitions import CommandLong
 from ....mavlink.enumerations import (
     MAV_CMD_COMPONENT_ARM_DISARM,
     MAV_CMD_DO_AUX_FUNCTION,
     MAV_CMD_DO_FLIGHTTERMINATION,
+    MAV_CMD_DO_MOTOR_TEST,
     MAV_RESULT_IN_PROGRESS,
 )
+from .motor_test import COMMANDS as MOTOR_TESTS
 from .state import ARM_EMERGENCY_STOP, MOTOR_ESTOP
 
 if TYPE_CHECKING:
     from ....clock import Instant
-    from ....mavlink.definitions import CommandAck, CommandInt, CommandLong
+    from ....mavlink.definitions import CommandAck, CommandInt
     from .state import Stop
 
-COMMANDS: Final = frozenset({MAV_CMD_COMPONENT_ARM_DISARM, MAV_CMD_DO_FLIGHTTERMINATION, MAV_CMD_DO_AUX_FUNCTION})
+COMMANDS: Final = (
+    frozenset({MAV_CMD_COMPONENT_ARM_DISARM, MAV_CMD_DO_FLIGHTTERMINATION, MAV_CMD_DO_AUX_FUNCTION}) | MOTOR_TESTS
+)
 LOW, MIDDLE, HIGH = 0, 1, 2  # the positions of a switch
 ENGAGES: Final[dict[tuple[float, float], bool]] = {
     (MOTOR_ESTOP, LOW): False,
@@ -50,6 +55,8 @@ class PendingCommand(NamedTuple):
     """What was known of a stop before it."""
     after: Stop
     """What is known while it is outstanding."""
+    lasts: float = 0.0
+    """Of a motor test: its seconds, for all of its motors; 0 if it does not say them."""
 
     @property
     def engages(self) -> bool | None:
@@ -70,7 +77,10 @@ def asked(
     """The command, if a status depends on it. NaN parameters match nothing."""
     if message.command not in COMMANDS:
         return None
-    return PendingCommand(message.command, message.param1, message.param2, sender, now.mono, stop, stop)
+    lasts = 0.0
+    if message.command == MAV_CMD_DO_MOTOR_TEST:
+        lasts = message.param4 * max(message.param5 if isinstance(message, CommandLong) else message.x, 1)
+    return PendingCommand(message.command, message.param1, message.param2, sender, now.mono, stop, stop, lasts)
 
 
 def remembered(pending: Pending, asked: PendingCommand) -> Pending:

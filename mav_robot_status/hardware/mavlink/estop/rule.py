@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Final
 from ....interface.status import TriState
 from ....mavlink.enumerations import MAV_STATE_FLIGHT_TERMINATION
 from ..autopilots.profile import EmergencyStop
-from ..facts import Applet, Outputs, Stop
+from ..facts import Applet, MotorTest, Outputs, Stop
 from ..faults.causes import TERMINATION_ANNOUNCED
 from ..faults.rule import latch_words
+from ..faults.sensors import safety_switch_on
 from ..heartbeat.rule import UNEXPLAINED, is_simulated, state_words
 from ..identity import PLANE
 from ..motion.estimate import hud_speeds
 from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason, words
+from ..reason import at as latest_at
 from ..state import FRESH, honours_stop, vtol_state
 from . import applet as applets
+from . import motor_test as tests
 from . import outputs
 from . import state as estop
 
@@ -45,6 +48,30 @@ def motor_outputs(state: VehicleState, deadline: Deadline, options: HardwareOpti
     at_stop = state.latest.esc is not None and outputs.is_at_stop(watch, state.vehicle_type)
     fresh = deadline.is_within(watch.at + FRESH)
     return Outputs(fresh, watch.driven, watch.held and proves, at_stop, watch.idle and proves)
+
+
+NO_TEST: Final = MotorTest(False, False)
+
+
+def motor_test(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> MotorTest:
+    """Whether a motor turns although the vehicle is disarmed."""
+    test, latest = state.test, state.latest
+    if state.heartbeats.armed or _is_held(state):
+        return NO_TEST
+    if deadline.is_within(test.turned_at + tests.LASTS):
+        return MotorTest(True, True)
+    driven = deadline.is_within(test.driven_at + tests.LASTS) and test.driven_at > test.stopped_at
+    stands = deadline.is_within(test.stopped_at + FRESH)
+    said = deadline.is_within(test.until) and not (stands and test.stopped_at > test.said_at + tests.LASTS)
+    coasts = not deadline.has_come(state.heartbeats.edge.mono + tests.COASTS)
+    rpm = deadline.is_fresh(latest.esc, FRESH) and not stands and not coasts
+    return MotorTest(False, driven or said or rpm)
+
+
+def _is_held(state: VehicleState) -> bool:
+    """Whether the safety switch holds the outputs, as far as known."""
+    heard = state.latest.sys_status
+    return heard is not None and state.profile.sensors.has_safety_switch and safety_switch_on(heard.message)
 
 
 def outputs_vetoed(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
@@ -111,6 +138,17 @@ def assumed_free(state: VehicleState, deadline: Deadline, options: HardwareOptio
 # -- evidence in words -------------------------------------------------------------------------------------------------
 
 
+def motor_test_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
+    """The pulses of the motors that stand at another value while no test runs, else what said that a test runs."""
+    test, watch = state.test, state.watch
+    if test.driven_at > max(test.said_at, test.stopped_at) or facts.motor_test.turns:
+        shown = ", ".join(f"{c}: {watch.values[c - 1]} us" for c in test.stop if c <= len(watch.values))
+        return f"SERVO_OUTPUT_RAW {shown}", test.driven_at
+    if test.source is not None and test.said_at > (latest_at(state.latest.esc) or -math.inf):
+        return test.source, test.said_at
+    return esc_words(state, facts, reason)
+
+
 def stop_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
     """What was said of a stop."""
     return state.stop.source, state.stop.last
@@ -175,6 +213,9 @@ NOT_WATCHED: Final = Reason("the outputs are not watched")
 def e_stopped(facts: Facts, options: HardwareOptions) -> Finding:
     """Whether an emergency stop is engaged."""
     found = RULES[facts.kind.profile.stops.shown_by](facts, options)
+    if found[0] is TRUE and facts.motor_test.may_turn:  # a stop does not end a motor test
+        turns = "turns" if facts.motor_test.turns else "may turn"
+        return UNKNOWN, Reason(f"a stop is reported, but a motor {turns}", motor_test_words, doubt=True)
     if found[0] is UNKNOWN and not found[1].doubt and options.estop_unknown_as == "false":
         return FALSE, Reason("estop_unknown_as: false")
     return found
@@ -249,7 +290,7 @@ def _doubt(rule: str) -> Reason:
 
 def _released(facts: Facts, options: HardwareOptions, watched: TriState, why: Reason) -> Finding:
     """FALSE if there is evidence that no stop is engaged. `watched` and its reason `why` are what the outputs show."""
-    if not facts.armed and facts.fresh.sys_status and facts.stop.is_ready:
+    if not facts.armed and facts.fresh.sys_status and facts.stop.is_ready and not facts.motor_test.may_turn:
         if facts.stop_excused:
             excused = "the pre-arm checks pass, but do not fail on a stop by the switch of option 165"
             return UNKNOWN, Reason(excused, switches_words)

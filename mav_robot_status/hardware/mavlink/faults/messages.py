@@ -11,6 +11,7 @@ from ....mavlink import enumerations as mavlink
 from ....mavlink.decode import text
 from ....mavlink.definitions import SysStatus
 from ..autopilots import shown_by
+from ..estop import motor_test
 from ..estop import state as estop
 from ..readiness import state as readiness
 from ..state import heard
@@ -43,6 +44,7 @@ def sys_status(state: VehicleState, message: SysStatus, now: Instant, options: H
     if state.latches:
         failsafe.radio_heard(state, now.mono)
     checked = estop.includes_stop(profile, state.family, state.version, state.reports_mission)
+    checked = checked and not motor_test.is_possible(state.test, now.mono)  # a test forces PREARM_CHECK healthy
     state.stop = estop.heard_sys_status(state.stop, message, state.heartbeats, profile, checked, now.mono)
     state.faults = sensors.heard_faults(state.faults, sensors.faulty_mask(message, profile), now)
     if state.readiness is not readiness.NOTHING and sensors.readiness(message, profile) is TriState.TRUE:

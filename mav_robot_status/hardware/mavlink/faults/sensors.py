@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ....clock import Instant
     from ....mavlink.definitions import SysStatus
     from ..autopilots import Autopilot
-    from ..autopilots.firmware import Firmware
+    from ..autopilots.profile import Version
 
 GPS: Final = mavlink.MAV_SYS_STATUS_SENSOR_GPS
 MOTOR_OUTPUTS: Final = mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
@@ -84,17 +84,18 @@ def heard_faults(faults: Faults, mask: int, now: Instant) -> Faults:
 
 
 def counting(
-    faults: Faults, profile: Autopilot, firmware: Firmware | None, armed: bool
+    faults: Faults, profile: Autopilot, firmware: Version | None, armed: bool
 ) -> list[tuple[int, Weight, Fault]]:
     """The faults with a meaning: (bit, weight, fault); SOFT ones only while armed.
 
-    A bit whose health means something else in this version of the firmware has none. Without a version it has.
+    A bit whose health means something else in older firmware has none there, nor while the least version of the
+    `firmware` is unknown.
     """
     weights, since = profile.sensors.weights, profile.sensors.since
     out = []
     for bit, fault in faults.items():
         weight = HARD if bit - 32 in EXTENDED_BITS else weights.get(bit)
-        if bit in since and firmware is not None and firmware < since[bit]:
+        if bit in since and (firmware is None or firmware < since[bit]):
             continue
         if weight is HARD or (weight is SOFT and armed):
             out.append((bit, weight, fault))
@@ -109,6 +110,11 @@ def readiness(status: SysStatus, profile: Autopilot) -> TriState:
     if not told:
         return UNKNOWN
     return TRUE if status.onboard_control_sensors_health & told else FALSE
+
+
+def has_prearm_check(status: SysStatus) -> bool:
+    """Whether it reports the pre-arm checks at all: only firmware from a known version on does."""
+    return bool(status.onboard_control_sensors_present & PREARM_CHECK)
 
 
 def safety_switch_on(status: SysStatus) -> bool:

@@ -10,6 +10,7 @@ from ..autopilots import firmware
 from ..autopilots import texts as text_rules
 from ..autopilots.profile import StopText
 from ..autopilots.texts import UNCLASSIFIED, Effect, TextRule, When, classify
+from ..estop import motor_test
 from ..estop import state as estop
 from ..readiness import state as readiness
 from ..state import Statement, ToldFirmware, honours_stop, is_fresh
@@ -54,6 +55,7 @@ def _said(state: VehicleState, text: text_assembly.Text, now: Instant) -> None:
     words = text.text
     if text_rules.ARMING.match(words):
         state.told_armed = max(state.told_armed, now.mono)
+    motor_test.heard_text(state.test, words, now.mono)
     if words in state.profile.requests.boot_texts:
         state.started_at = now.mono
     version = firmware.of_text(words, state.profile.texts.firmware, state.family)

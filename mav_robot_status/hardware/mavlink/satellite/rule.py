@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Final
 from ....interface.status import RobotMode
 from ..facts import Cause, Seldom
 from ..heartbeat.rule import actuators_blocked, is_initialising
-from ..power import off
-from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason
+from ..reason import FALSE, TRUE, UNKNOWN, Finding, Reason, off
 from .failure_flags import failures
 from .state import speed
 

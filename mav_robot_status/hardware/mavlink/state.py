@@ -170,7 +170,7 @@ class VehicleState:
     def counting_faults(self, options: HardwareOptions) -> list[tuple[int, Weight, sensors.Fault]]:
         """The faults in SYS_STATUS that have a meaning for this vehicle, at this site."""
         check, status = self.profile.stops.check, self.latest.sys_status
-        least: Version | None = self.version
+        least: Firmware | Version | None = self.version
         if least is None and check is not None and status is not None and sensors.has_prearm_check(status.message):
             least = check.prearm_check
         return [

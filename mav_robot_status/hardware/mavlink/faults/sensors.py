@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ....clock import Instant
     from ....mavlink.definitions import SysStatus
     from ..autopilots import Autopilot
+    from ..autopilots.firmware import Firmware
     from ..autopilots.profile import Version
 
 GPS: Final = mavlink.MAV_SYS_STATUS_SENSOR_GPS
@@ -84,7 +85,7 @@ def heard_faults(faults: Faults, mask: int, now: Instant) -> Faults:
 
 
 def counting(
-    faults: Faults, profile: Autopilot, firmware: Version | None, armed: bool
+    faults: Faults, profile: Autopilot, firmware: Firmware | Version | None, armed: bool
 ) -> list[tuple[int, Weight, Fault]]:
     """The faults with a meaning: (bit, weight, fault); SOFT ones only while armed.
 

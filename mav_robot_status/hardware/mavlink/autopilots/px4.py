@@ -100,9 +100,10 @@ TEXTS: Final = table(
             (causes.GCS_LOST,),
         ),
         # up to 1.11 only texts show a kill: no state FLIGHT_TERMINATION
-        (r"(?i)(manual )?kill-switch engaged", Effect.ESTOP),
-        (r"(?i)(manual )?kill-switch disengaged", Effect.RELEASE),
-        (r"Kill (dis)?engaged|Failsafe activated", DETAIL),
+        # later ones word it otherwise, and the text comes before the HEARTBEAT with the state
+        (r"(?i)(manual )?kill(-switch)? engaged", Effect.ESTOP),
+        (r"(?i)(manual )?kill(-switch)? disengaged", Effect.RELEASE),
+        (r"Failsafe activated", DETAIL),
         (r"Connection to mission computer lost", CAUSE, (causes.GCS_LOST,)),
         (r"Connection to ground station lost", CAUSE, (causes.GCS_LOST,), When.CRITICAL),
         (r"Preflight Fail: (Kill switch engaged|Flight termination active)", DETAIL),

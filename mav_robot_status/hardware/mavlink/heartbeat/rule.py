@@ -73,7 +73,7 @@ def fresh(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> 
         velocity == "GLOBAL_POSITION_INT",
         is_fresh(latest.gps, FRESH),
         deadline.is_within(state.arrived + timeout_of(state, options)),
-        latest.heartbeat is not None and state.told_armed > latest.heartbeat.at,
+        beat is not None and state.told_armed > beat.at,
     )
 
 

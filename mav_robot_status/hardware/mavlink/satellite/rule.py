@@ -67,6 +67,8 @@ def drives_powered(told: Seldom, facts: Facts, options: HardwareOptions) -> Find
     """Armed, if the message says whether it is armed."""
     if told.armed is UNKNOWN:
         return UNKNOWN, ARMED_UNTOLD
+    if told.armed is FALSE and facts.fresh.arming_told:
+        return UNKNOWN, Reason("another HIGH_LATENCY2, which is late, says that it is armed", high_latency_words)
     if told.armed is FALSE:
         return FALSE, Reason("disarmed", high_latency_words)
     if actuators_blocked(facts, options):

@@ -682,7 +682,6 @@ def test_an_armed_message_is_held_against_heartbeats_in_a_state_without_motion_o
         sky.wait(0.5)
 
 
-@pytest.mark.xfail(strict=True, reason="two vehicles in one count, whose clocks are those of HIGH_LATENCY2")
 def test_of_two_vehicles_on_one_satellite_the_disarmed_one_with_the_later_clock_is_not_believed() -> None:
     sky = Sky()
     for number in range(12):

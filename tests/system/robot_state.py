@@ -11,7 +11,7 @@ import socket
 import struct
 from typing import Any, NamedTuple
 
-from ..deadline import SOON, allow
+from ..deadline import SOON, Deadline, allow
 
 TOPIC, REQUEST, REPLY = 1, 2, 3
 PING, STATUS = 1, 13
@@ -78,8 +78,9 @@ class RobotState:
 
     def wait_for_end(self) -> bytes:
         """Read until the other end closes the connection. Returns the last frame."""
-        data = b""
+        data, deadline = b"", Deadline(SOON)
         while more := self.socket.recv(1 << 16):
+            assert deadline.left, "the other end keeps the connection"
             data = (data + more)[-LAST:]
         return data
 

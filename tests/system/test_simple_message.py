@@ -287,7 +287,7 @@ def test_after_a_reload_no_client_keeps_a_status_of_before(
     client.wait_for(drives_powered=0)
     file.write_text(text.format(2))
     gate.process.send_signal(signal.SIGHUP)
-    assert struct.unpack("<11i", client.wait_for_end()) == (40, 13, 1, 0, *UNKNOWN)
+    client.wait_for(drives_powered=-1)
 
 
 def test_a_killed_gateway_frees_its_port(gateway: StartGateway, wire: OpenWire, connect: Connect) -> None:

@@ -78,7 +78,12 @@ def servo_output_raw(state: VehicleState, message: mav.ServoOutputRaw, now: Inst
 def _heard_disarmed(state: VehicleState, values: outputs.Outputs, now: float) -> None:
     """The outputs of a disarmed vehicle: a motor test drives them."""
     status = state.latest.sys_status
-    held = status is not None and state.profile.sensors.has_safety_switch and safety_switch_on(status.message)
+    held = (
+        status is not None
+        and is_fresh(status, now, FRESH)
+        and state.profile.sensors.has_safety_switch
+        and safety_switch_on(status.message)
+    )
     if held or now < state.heartbeats.edge.mono + motor_test.AFTER_DISARM:
         return
     if state.profile.stops.outputs_show:

@@ -56,7 +56,7 @@ NO_TEST: Final = MotorTest(False, False)
 def motor_test(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> MotorTest:
     """Whether a motor turns although the vehicle is disarmed."""
     test, latest = state.test, state.latest
-    if state.heartbeats.armed or _is_held(state):
+    if state.heartbeats.armed or _is_held(state, deadline):
         return NO_TEST
     if deadline.is_within(test.turned_at + tests.LASTS):
         return MotorTest(True, True)
@@ -68,10 +68,15 @@ def motor_test(state: VehicleState, deadline: Deadline, options: HardwareOptions
     return MotorTest(False, driven or said or rpm)
 
 
-def _is_held(state: VehicleState) -> bool:
-    """Whether the safety switch holds the outputs, as far as known."""
+def _is_held(state: VehicleState, deadline: Deadline) -> bool:
+    """Whether a fresh SYS_STATUS says that the safety switch holds the outputs."""
     heard = state.latest.sys_status
-    return heard is not None and state.profile.sensors.has_safety_switch and safety_switch_on(heard.message)
+    return (
+        heard is not None
+        and deadline.is_fresh(heard, FRESH)
+        and state.profile.sensors.has_safety_switch
+        and safety_switch_on(heard.message)
+    )
 
 
 def outputs_vetoed(state: VehicleState, deadline: Deadline, options: HardwareOptions) -> bool:
@@ -205,6 +210,8 @@ def outputs_words(state: VehicleState, facts: Facts, reason: Reason) -> Shown:
 
 
 ASSUMED: Final = Reason("not stopped when armed, and no text since (estop_assume_visible)")
+NEWER_KILL: Final = frozenset({"Kill engaged"})
+"""The words for a kill of PX4 versions that show it in their state, too (Commander.cpp, 1.17)."""
 APPLET: Final = Reason("the applet on the autopilot says so", applet_words)
 SAID: Final = Reason("the autopilot said so", stop_words)
 NOT_WATCHED: Final = Reason("the outputs are not watched")
@@ -230,7 +237,7 @@ def _by_state(facts: Facts, options: HardwareOptions) -> Finding:
     said, version, shown_from = facts.stop.said, facts.kind.firmware, facts.kind.profile.stops.shown_from
     shows_all = version is not None and shown_from is not None and version >= shown_from
     if said is TRUE:
-        if shows_all:
+        if shows_all or facts.stop.text in NEWER_KILL:
             return UNKNOWN, Reason(
                 "a text reports a stop, and no heartbeat has shown the state since", stop_words, doubt=True
             )

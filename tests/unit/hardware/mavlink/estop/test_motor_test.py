@@ -7,7 +7,7 @@ import pytest
 from mav_robot_status.interface import TriState
 from mav_robot_status.mavlink import definitions as mav
 
-from ..driver import PLANE, Flight, copter, px4
+from ..driver import FITTED, MOTORS, PLANE, Flight, copter, px4
 
 TRUE, FALSE, UNKNOWN = TriState.TRUE, TriState.FALSE, TriState.UNKNOWN
 REST = (1000, 1000, 1000, 1000, 0, 0, 0, 0)
@@ -192,3 +192,13 @@ def test_rpm_without_outputs_is_a_doubt_once_it_cannot_coast_any_more() -> None:
     flight.stop("esc")
     flight.wait(3)
     assert flight.status.drives_powered is FALSE
+
+
+def test_a_safety_switch_that_was_reported_long_ago_does_not_hold_a_motor() -> None:
+    bench = Bench(copter())
+    bench.flight.set(present=FITTED, enabled=FITTED & ~MOTORS).wait(2)
+    bench.turn(2, 1300)
+    bench.flight.wait(2)
+    assert bench.flight.status.drives_powered is FALSE
+    bench.flight.stop("sys_status").wait(6)
+    check_turns(bench.flight)

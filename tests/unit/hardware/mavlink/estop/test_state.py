@@ -120,6 +120,15 @@ def test_a_stop_between_arming_and_the_armed_heartbeat_is_kept() -> None:
     assert flight.status.e_stopped is TriState.TRUE
 
 
+def test_the_newer_words_for_a_kill_are_a_doubt_until_the_state_shows_it() -> None:
+    flight = px4().hb(armed=True, state=ACTIVE).text("Kill engaged\t", 0)
+    assert (flight.status.e_stopped, flight.status.drives_powered) == (TriState.UNKNOWN, TriState.UNKNOWN)
+    flight.hb(state=TERMINATED)
+    assert flight.status.e_stopped is TriState.TRUE
+    status = flight.text("Kill disengaged\t", 6).hb(state=ACTIVE).status
+    assert status.e_stopped is TriState.FALSE
+
+
 KILL, RELEASED = "Manual kill-switch engaged", "Manual kill-switch disengaged"
 
 
